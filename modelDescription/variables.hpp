@@ -1,0 +1,36 @@
+// The one table of FMU variables. The XML, get and set, and the reports are written from it.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "../src/simulation.hpp"
+
+namespace tiefmu {
+
+enum class Causality { parameter, calculatedParameter, input, output };
+
+// A block: `numbers.size()` elements of `components` doubles each, contiguous in memory and in value references.
+// Variable k of element e is named prefix[numbers[e]].name[k+1] (components 3), prefix[numbers[e]].name (1), or just
+// `name` where prefix is empty. Its value reference is reference + e * components + k, its place in
+// Simulation::data() is place + e * components + k.
+struct Block {
+  std::string prefix;        // "master", "slave", "point" or ""
+  std::string name;          // "v", "f_ext", "stable_time_step", ...
+  int components = 1;        // 1 or 3
+  Causality causality = Causality::output;
+  std::string unit;          // one of the unit table, e.g. "m/s"
+  std::string description;   // without the id; "(node ID)" is appended per element
+  Field field = Field::velocity;
+  std::size_t place = 0;
+  std::vector<int> numbers;
+  std::vector<std::int64_t> ids;  // node id per element
+  std::uint32_t reference = 0;
+  std::size_t count() const { return numbers.size() * static_cast<std::size_t>(components); }
+};
+
+// Blocks in the order of their value references (from 0, without gaps).
+std::vector<Block> variables(const Model& model, const Layout& layout);
+
+}  // namespace tiefmu

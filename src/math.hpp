@@ -1,0 +1,50 @@
+// Small vectors, and the rotation of one step.
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <cmath>
+
+namespace tiefmu {
+
+using Vec3 = Eigen::Vector3d;
+using Mat3 = Eigen::Matrix3d;
+using Quat = Eigen::Quaterniond;
+using MapVec3 = Eigen::Map<Vec3>;
+using ConstMapVec3 = Eigen::Map<const Vec3>;
+
+inline MapVec3 at(double* p, Eigen::Index i) { return MapVec3(p + 3 * i); }
+inline ConstMapVec3 at(const double* p, Eigen::Index i) { return ConstMapVec3(p + 3 * i); }
+
+// The matrix of u x (.), so that skew(u) v = u x v.
+inline Mat3 skew(const Vec3& u) {
+  Mat3 m;
+  m << 0, -u.z(), u.y(), u.z(), 0, -u.x(), -u.y(), u.x(), 0;
+  return m;
+}
+
+// Unit quaternion of the rotation vector `angle` (rad): the exponential map of SO(3), exact for any angle.
+inline Quat exponential(const Vec3& angle) {
+  const double half2 = 0.25 * angle.squaredNorm();
+  double c, s;  // cos|angle/2| and sin|angle/2| / |angle/2|
+  if (half2 < 1e-2) {  // Taylor: the next terms are below 1e-17
+    c = 1 - half2 / 2 * (1 - half2 / 12 * (1 - half2 / 30 * (1 - half2 / 56 * (1 - half2 / 90))));
+    s = 1 - half2 / 6 * (1 - half2 / 20 * (1 - half2 / 42 * (1 - half2 / 72 * (1 - half2 / 110))));
+  } else {
+    const double half = std::sqrt(half2);
+    c = std::cos(half);
+    s = std::sin(half) / half;
+  }
+  const Vec3 v = 0.5 * s * angle;
+  return Quat(c, v.x(), v.y(), v.z());
+}
+
+// Rotation vector (rad, length in [0, pi]) of a unit quaternion: the inverse of `exponential`.
+inline Vec3 logarithm(const Quat& q) {
+  const double sign = q.w() < 0 ? -1.0 : 1.0;
+  const Vec3 v = sign * q.vec();
+  const double n = v.norm();
+  return n < 1e-12 ? Vec3(2.0 * v) : Vec3(2.0 * std::atan2(n, sign * q.w()) / n * v);
+}
+
+}  // namespace tiefmu

@@ -1,0 +1,123 @@
+// A scene made ready to compute: slaves bound to their segments and sorted by them, nodes sorted into ranges, springs
+// resolved to the ends they hold. Constant after `compile`, shared by every simulation of it.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "scene.hpp"
+
+namespace tiefmu {
+
+// Independent nodes (masters and points) are sorted into these groups, by ascending id inside each. Rotating nodes
+// come first and free ones stand together, so that every array below is a contiguous slice of its field:
+// rotating = [0, begin[freeMaster]), free = [begin[rotatingFreeMaster], begin[fixedMaster]).
+enum NodeGroup : int {
+  rotatingDrivenMaster, rotatingDrivenPoint, rotatingFixedMaster, rotatingFixedPoint, rotatingFreeMaster,
+  rotatingFreePoint, freeMaster, freePoint, fixedMaster, fixedPoint, drivenMaster, drivenPoint, nodeGroups
+};
+
+// How a slave follows its segment (THEORY 2).
+enum class Coupling : std::uint8_t {
+  rotation,     // default formulation, every master of the segment turns: v_s = v_P + w_P x d
+  meanMotion,   // optimized formulation: v_s = v_C + w x d
+  translation,  // default formulation, masters without rotation: v_s = v_P
+};
+
+// Slaves of one coupling on segments of one shape, contiguous in every slave array and grouped by segment.
+struct TieGroup {
+  Coupling coupling;
+  int corners;     // 4 or 3
+  int firstSlave;  // index of the group's first slave in the slave arrays
+  std::vector<int> node;        // corners per segment: independent node indices
+  std::vector<int> begin;       // segments + 1: slaves of segment e are firstSlave + [begin[e], begin[e+1])
+  std::vector<double> weight;   // corners per slave: Phi at the projection
+  std::vector<double> clamped;  // corners per slave: Phi at the projection clamped to the segment (masses, stiffness)
+  int segments() const { return static_cast<int>(begin.size()) - 1; }
+  int slaves() const { return begin.back(); }
+};
+
+// One end of a spring. Exactly one of node, slave is >= 0, or none: ground.
+struct SpringEnd {
+  int node = -1;
+  int slave = -1;
+  int orientation = -1;  // index into Model::oriented, where the spring needs the end's rotation
+};
+
+struct Spring {
+  SpringEnd a, b;
+  SpringKind kind;
+  Vec3 stiffness, damping, rotationalStiffness, rotationalDamping;  // axial: first entry of the first two
+  Vec3 arm;       // position of a minus position of b at the start (zero for ground)
+  Vec3 anchor;    // ground: where it is
+  double length;  // rest length of an axial spring
+};
+
+struct Finding {  // one line of the tie report
+  enum Kind { warning, note } kind;
+  std::string text;
+};
+
+struct SlaveReport {
+  std::int64_t id = 0;
+  int tie = 0;
+  std::int64_t segment = 0;  // id
+  double xi = 0, eta = 0;
+  double distance = 0;       // slave to its projection, m
+  double offset = 0;         // d: to the projection (default) or the barycentre (optimized), m
+  double condition = 0;      // cond(Ibar) of the segment
+  double lambda = 0;         // 1/m2
+  bool clamped = false;
+};
+
+struct Model {
+  Settings settings;
+
+  // independent nodes, sorted by group
+  std::array<int, nodeGroups + 1> begin{};
+  std::vector<std::int64_t> nodeId;
+  std::vector<int> nodeNumber;  // i of master[i], p of point[p]: from 1 by ascending id
+  std::vector<double> nodePosition, nodeVelocity;  // 3 per node
+  std::vector<double> nodeSpin;                    // 3 per rotating node
+  std::vector<double> nodeMass, nodeInertia, nodeStiffness, nodeRotationalStiffness;
+
+  // slaves: turning ones (rotation, meanMotion) first
+  std::vector<std::int64_t> slaveId;
+  std::vector<int> slaveNumber;            // j of slave[j]: from 1 by ascending id
+  std::vector<double> slavePosition;       // 3 per slave
+  std::vector<double> slaveOffset;         // 3 per slave: d at the start
+  std::vector<double> slaveMass, slaveInertia, slaveStiffness, slaveRotationalStiffness;
+  std::vector<TieGroup> groups;            // in slave order: rotation, meanMotion, translation; quads before triangles
+
+  std::vector<Spring> springs;
+  std::vector<SpringEnd> oriented;         // ends whose rotation is tracked as a unit quaternion
+
+  // what the report says
+  std::vector<std::string> tieName;
+  std::vector<SlaveReport> slaveReport;    // in slave order
+  std::vector<Finding> findings;
+
+  int nodes() const { return begin[nodeGroups]; }
+  int rotating() const { return begin[freeMaster]; }
+  int freeBegin() const { return begin[rotatingFreeMaster]; }
+  int freeEnd() const { return begin[fixedMaster]; }
+  int free() const { return freeEnd() - freeBegin(); }
+  int slaves() const { return static_cast<int>(slaveId.size()); }
+  int turning() const { return turningSlaves; }
+  int turningSlaves = 0;
+  bool anyFree() const { return free() > 0; }
+  bool anyDriven() const;
+  bool isMaster(int group) const { return group % 2 == 0; }
+  bool exposes(const char* name) const;  // is this name of INTERFACE's expose list asked for?
+
+  bool needsPositions() const;     // node positions are states (or inputs)
+  bool finite() const { return settings.geometry == Geometry::finite; }
+  bool accelerationInputs() const { return settings.reaction != Reaction::loads; }
+};
+
+// Searches, checks and sorts. Throws SceneError with one line naming table and id.
+Model compile(const Scene& scene);
+
+}  // namespace tiefmu

@@ -1,0 +1,90 @@
+// What the caller describes: nodes, segments, ties, springs and settings, as plain arrays in SI units.
+// Everything refers to nodes and segments by their index in these arrays; ids are kept for reports and messages.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "math.hpp"
+
+namespace tiefmu {
+
+enum class Motion : std::uint8_t { driven, free, fixed };
+enum class Formulation : std::uint8_t { standard, optimized };  // Spotflag 0 and 1; "default" is a C++ keyword
+enum class SearchMethod : std::uint8_t { box, nearestNode };    // Isearch 2 and 1
+enum class SpringKind : std::uint8_t { axial, bushing };
+enum class Inertia : std::uint8_t { lumped, consistent };
+enum class Reaction : std::uint8_t { loads, full, split };
+enum class Geometry : std::uint8_t { finite, small };
+enum class Position : std::uint8_t { integrated, input };
+enum class Method : std::uint8_t { centralDifference, symplecticEuler, nohBathe, rk4 };
+
+struct SceneNodes {
+  std::vector<std::int64_t> id;
+  std::vector<Vec3> position;           // m
+  std::vector<Motion> motion;           // ignored for slaves
+  std::vector<std::uint8_t> rotations;  // 1: the node has rotational freedom
+  std::vector<double> mass;             // kg
+  std::vector<double> inertia;          // kg m2, spherical
+  std::vector<double> stiffness;        // N/m, declared nodal stiffness of what the scene does not hold
+  std::vector<double> rotationalStiffness;  // N m/rad
+  std::vector<Vec3> velocity;           // m/s at the start
+  std::vector<Vec3> spin;               // rad/s at the start
+};
+
+struct SceneSegments {
+  std::vector<std::int64_t> id;
+  std::vector<std::array<int, 4>> nodes;  // node indices; the fourth is -1 for a triangle
+};
+
+struct SceneTie {
+  std::string name;
+  std::vector<int> segments;
+  std::vector<int> slaves;
+  Formulation formulation = Formulation::standard;
+  SearchMethod search = SearchMethod::box;
+  double searchDistance = 0;  // m; 0: root mean square of the master edges
+  bool dropUnresolved = false;
+};
+
+struct SceneSpring {
+  std::string name;  // how messages call it, e.g. "spring 2"
+  int a = -1;        // node index
+  int b = -1;        // node index, or -1: ground at the start position of a
+  SpringKind kind = SpringKind::axial;
+  Vec3 stiffness = Vec3::Zero();            // N/m; axial: the first entry
+  Vec3 damping = Vec3::Zero();              // N s/m
+  Vec3 rotationalStiffness = Vec3::Zero();  // N m/rad
+  Vec3 rotationalDamping = Vec3::Zero();    // N m s/rad
+};
+
+struct Settings {
+  Inertia inertia = Inertia::lumped;
+  Reaction reaction = Reaction::loads;
+  Geometry geometry = Geometry::finite;
+  Position position = Position::integrated;
+  Vec3 gravity = Vec3::Zero();  // m/s2
+  Method method = Method::centralDifference;
+  double timeStep = 0;          // s; 0: safety * limit
+  double safety = 0.9;
+  std::vector<std::string> expose, hide;  // names of INTERFACE's last two tables
+};
+
+struct Scene {
+  SceneNodes nodes;
+  SceneSegments segments;
+  std::vector<SceneTie> ties;
+  std::vector<SceneSpring> springs;
+  Settings settings;
+};
+
+// A scene that cannot be modelled. `what()` is one line that starts with the table it speaks of,
+// e.g. "tie 'weld': slave 101: ...".
+struct SceneError : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+}  // namespace tiefmu
