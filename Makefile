@@ -4,7 +4,7 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
-REQUIRES = $(shell sed -n 's/^requires = \[\(.*\)\]/\1/p' pyproject.toml | sed 's/",* */" /g')
+REQUIRES = $(shell sed -n 's/^requires = \[\(.*\)\]/\1/p' pyproject.toml | sed 's/", /" /g')
 SOURCES := CMakeLists.txt $(wildcard src/*.?pp modelDescription/*.?pp fmu/*.?pp python/bindings/*.?pp)
 
 .PHONY: demo test bench clean
