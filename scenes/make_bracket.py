@@ -1,4 +1,4 @@
-"""Writes bracket.msh (gmsh: a flange with a bolt hole, rolled onto a cylinder, and the coarse plate below it, with named
+"""Writes bracket.msh (gmsh: a flange with a bolt hole, rolled onto a cylinder, and the plate below it, with named
 groups) and bracket.csv (the pull on the bolt): python scenes/make_bracket.py (needs gmsh)"""
 
 from pathlib import Path

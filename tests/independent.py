@@ -1,0 +1,510 @@
+"""The tie once more, from THEORY alone: dense, slow and short. Shares no code with the project.
+
+Kernels (shape to springs) work on one segment or spring; `Problem` assembles a scene given as the dict of a TOML file
+(inline mesh, SI, sets by ids or "all") and `Problem.solve` integrates it to rounding. Degrees of freedom are ordered
+(v, w) node by node, six per node; nodes without rotation have zero columns there.
+"""
+
+import numpy as np
+from scipy.integrate import solve_ivp
+from scipy.linalg import eigh
+
+
+def skew(u):
+    return np.array([[0, -u[2], u[1]], [u[2], 0, -u[0]], [-u[1], u[0], 0]])
+
+
+# ---- one segment (THEORY 2, 4, 7) ------------------------------------------------------------------------------------
+
+
+def shape(n, xi, eta):
+    if n == 3:
+        return np.array([1 - xi - eta, xi, eta])
+    return 0.25 * np.array([(1 - xi) * (1 - eta), (1 + xi) * (1 - eta), (1 + xi) * (1 + eta), (1 - xi) * (1 + eta)])
+
+
+def shape_gradient(n, xi, eta):
+    """(2, n): d Phi / d xi, d Phi / d eta."""
+    if n == 3:
+        return np.array([[-1.0, 1, 0], [-1, 0, 1]])
+    return 0.25 * np.array([[eta - 1, 1 - eta, 1 + eta, -1 - eta], [xi - 1, -1 - xi, 1 + xi, 1 - xi]])
+
+
+class Projection:
+    """Closest point of the extended surface: xi, eta, phi (n,), point, distance, outside (see `measure`)."""
+
+    def __init__(self, corners, xi, eta, s):
+        self.xi, self.eta = xi, eta
+        self.phi = shape(len(corners), xi, eta)
+        self.point = self.phi @ corners
+        self.distance = np.linalg.norm(s - self.point)
+        self.outside = np.max(1 - 2 * self.phi) if len(corners) == 3 else max(abs(xi), abs(eta))
+
+
+def project(corners, s):
+    """Triangle: the normal equations. Quad: damped Newton from the centre on half the squared distance."""
+    corners, s = np.asarray(corners, float), np.asarray(s, float)
+    if len(corners) == 3:
+        edges = (corners[1:] - corners[0]).T
+        xi, eta = np.linalg.lstsq(edges, s - corners[0], rcond=None)[0]
+        return Projection(corners, xi, eta, s)
+    twist = 0.25 * np.array([1, -1, 1, -1]) @ corners  # d2x / d xi d eta
+    half = lambda u: 0.5 * np.sum((shape(4, *u) @ corners - s) ** 2)
+    u = np.zeros(2)
+    for _ in range(200):
+        miss = shape(4, *u) @ corners - s
+        tangent = shape_gradient(4, *u) @ corners
+        gradient = tangent @ miss
+        hessian = tangent @ tangent.T
+        full = hessian + miss @ twist * np.array([[0, 1], [1, 0]])
+        # far from the surface the true Hessian can be indefinite; then Gauss-Newton still descends
+        descent = -np.linalg.solve(full if np.all(np.linalg.eigvalsh(full) > 0) else hessian, gradient)
+        if np.linalg.norm(descent) < 1e-15:
+            break
+        step = 1.0
+        while half(u + step * descent) > half(u) and step > 1e-3 and np.linalg.norm(descent) > 1e-7:
+            step /= 2
+        u = u + step * descent
+    return Projection(corners, *u, s)
+
+
+def clamp(corners, projection):
+    """Phi for masses, inertias and stiffnesses (THEORY 4)."""
+    if len(corners) == 3:
+        phi = np.maximum(projection.phi, 0)
+        return phi / phi.sum()
+    return shape(4, np.clip(projection.xi, -1, 1), np.clip(projection.eta, -1, 1))
+
+
+def mean_inertia(corners):
+    """C, r (n, 3), Ibar of unit node masses."""
+    centre = np.mean(corners, axis=0)
+    r = corners - centre
+    return centre, r, sum(ri @ ri * np.eye(3) - np.outer(ri, ri) for ri in r)
+
+
+def smallest_lambda(corners):
+    """lambda: the largest eigenvalue of Ibar^-1."""
+    return 1 / np.linalg.eigvalsh(mean_inertia(corners)[2])[0]
+
+
+def default_map(phi, d, rotating=True):
+    """T (6, 6 n): slave twist (v, w) from the masters' twists; d the offset from the projection."""
+    blocks = []
+    for p in phi:
+        block = np.zeros((6, 6))
+        block[:3, :3] = p * np.eye(3)
+        if rotating:
+            block[:3, 3:] = -p * skew(d)
+            block[3:, 3:] = p * np.eye(3)
+        blocks.append(block)
+    return np.hstack(blocks)
+
+
+def optimized_map(corners, d, r=None, ibar=None):
+    """T (6, 6 n); d the offset from the barycentre; r and ibar only to freeze them elsewhere than at the corners."""
+    if ibar is None:
+        _, r, ibar = mean_inertia(corners)
+    inverse = np.linalg.inv(ibar)
+    blocks = []
+    for ri in r:
+        spin = inverse @ skew(ri)
+        block = np.zeros((6, 6))
+        block[:3, :3] = np.eye(3) / len(r) - skew(d) @ spin
+        block[3:, :3] = spin
+        blocks.append(block)
+    return np.hstack(blocks)
+
+
+def default_bias(phi, spins, d):
+    """b (6,): w_P x (w_P x d); spins (n, 3)."""
+    w = phi @ spins
+    return np.concatenate([np.cross(w, np.cross(w, d)), np.zeros(3)])
+
+
+def optimized_bias(corners, velocities, d):
+    """b (6,) of THEORY 2, with dIbar/dt written out."""
+    _, r, ibar = mean_inertia(corners)
+    rate = velocities - velocities.mean(axis=0)
+    ibar_rate = sum(2 * ri @ ui * np.eye(3) - np.outer(ri, ui) - np.outer(ui, ri) for ri, ui in zip(r, rate))
+    w = np.linalg.solve(ibar, np.cross(r, velocities).sum(axis=0))
+    z = -np.linalg.solve(ibar, ibar_rate @ w)
+    return np.concatenate([np.cross(z, d) + np.cross(w, np.cross(w, d)), z])
+
+
+def lumped(corners, projection, offset, optimized, mass, inertia):
+    """Added (mass, inertia) per master of the segment, (n, 2) (THEORY 4); offset = d, a length. Also for seed (3)."""
+    turned = inertia + mass * offset**2
+    if optimized:
+        n = len(corners)
+        return np.column_stack([np.full(n, mass / n + turned * smallest_lambda(corners)), np.zeros(n)])
+    phi = clamp(corners, projection)
+    return np.column_stack([phi * mass, phi * turned])
+
+
+# ---- search (THEORY 7), all segments ---------------------------------------------------------------------------------
+
+
+def no_area(corners):
+    a, b = (corners[1:] - corners[0]) if len(corners) == 3 else (corners[2] - corners[0], corners[3] - corners[1])
+    edges = corners - np.roll(corners, 1, axis=0)
+    return np.linalg.norm(np.cross(a, b)) < 1e-12 * np.max(np.sum(edges**2, axis=1))
+
+
+def default_search_distance(position, segments):
+    """Root mean square of the segments' edges."""
+    edges = [position[np.array(s)] - position[np.roll(s, 1)] for s in segments]
+    return np.sqrt(np.mean(np.sum(np.vstack(edges) ** 2, axis=1)))
+
+
+def find(position, segments, ids, s, method, reach, tie=1e-9):
+    """(index of the winning segment, its projection) or (None, None). segments: node index tuples."""
+    usable = [e for e in range(len(segments)) if not no_area(position[list(segments[e])])]
+    size = reach
+    if method == "nearest-node":
+        nodes = sorted({n for e in usable for n in segments[e]})
+        inside = [n for n in nodes if np.all(np.abs(position[n] - s) <= reach / 2)]
+        if not inside:
+            return None, None
+        nearest = min(np.linalg.norm(position[n] - s) for n in inside)
+        held = {n for n in inside if np.linalg.norm(position[n] - s) <= nearest + tie * size}
+        rated = [(0.0, e, project(position[list(segments[e])], s)) for e in usable if held & set(segments[e])]
+    else:
+        rated = []
+        for e in usable:
+            corners = position[list(segments[e])]
+            p = project(corners, s)
+            inside = p.outside <= 1 + tie
+            rated.append((p.distance if inside else np.linalg.norm(corners - s, axis=1).min(), e, p))
+        rated = [c for c in rated if c[0] <= reach]
+        if not rated:
+            return None, None
+    best = min(c[0] for c in rated)
+    rated = [c for c in rated if c[0] <= best + tie * size]
+    least = min(c[2].outside for c in rated)
+    _, e, p = min((c for c in rated if c[2].outside <= least + tie), key=lambda c: ids[c[1]])
+    return (e, p) if p.outside <= 1.5 else (None, None)
+
+
+# ---- rotations and springs -------------------------------------------------------------------------------------------
+
+
+def rotation_matrix(q):
+    """Of a quaternion (w, x, y, z), any length."""
+    w, x, y, z = q / np.linalg.norm(q)
+    u = skew(np.array([x, y, z]))
+    return np.eye(3) + 2 * w * u + 2 * u @ u
+
+
+def quaternion_rate(q, w):
+    """dq/dt for a spin w in the inertial frame."""
+    return 0.5 * np.concatenate([[-w @ q[1:]], q[0] * w + np.cross(w, q[1:])])
+
+
+def rotation_vector(q):
+    """log of the rotation of a quaternion, length in [0, pi]."""
+    q = q / np.linalg.norm(q) * (1 if q[0] >= 0 else -1)
+    sine = np.linalg.norm(q[1:])
+    return 2 * q[1:] if sine < 1e-9 else 2 * np.arctan2(sine, q[0]) / sine * q[1:]
+
+
+def relative(q1, q2):
+    """Quaternion of R1 R2^T."""
+    a, b = q1, q2 * np.array([1, -1, -1, -1])
+    return np.concatenate([[a[0] * b[0] - a[1:] @ b[1:]], a[0] * b[1:] + b[0] * a[1:] + np.cross(a[1:], b[1:])])
+
+
+class Spring:
+    """One spring between bodies a and b (("node" | "slave", index) or None: ground)."""
+
+    def __init__(self, table, a, b, xa, xb):
+        three = lambda key: np.broadcast_to(np.asarray(table.get(key, 0.0), float), 3)
+        self.a, self.b, self.axial = a, b, table["kind"] == "axial"
+        self.k, self.c = three("stiffness"), three("damping")
+        self.kr, self.cr = three("rotational_stiffness"), three("rotational_damping")
+        self.arm = xa - xb
+        self.anchor = xb
+
+    def load(self, x1, x2, v1, v2, q1, q2, w1, w2):
+        """Load (6,) on a, load on b, strain energy, dissipated power."""
+        gap = x1 - x2
+        if self.axial:
+            length = np.linalg.norm(gap)
+            u = gap / length
+            stretch, rate = length - np.linalg.norm(self.arm), u @ (v1 - v2)
+            f = -(self.k[0] * stretch + self.c[0] * rate) * u
+            zero = np.zeros(3)
+            return (np.concatenate([f, zero]), np.concatenate([-f, zero]), 0.5 * self.k[0] * stretch**2,
+                    self.c[0] * rate**2)
+        stretch = gap - rotation_matrix(q2) @ self.arm
+        rate = v1 - v2 - np.cross(w2, gap)
+        angle, spin = rotation_vector(relative(q1, q2)), w1 - w2
+        f = -self.k * stretch - self.c * rate
+        m = -self.kr * angle - self.cr * spin
+        return (np.concatenate([f, m]), np.concatenate([-f, -m - np.cross(gap, f)]),
+                0.5 * (self.k @ stretch**2 + self.kr @ angle**2), self.c @ rate**2 + self.cr @ spin**2)
+
+    def strain_map(self):
+        """(6, 12): small motions (u, theta) of a and b to strains, and their stiffnesses (6,)."""
+        b = np.zeros((6, 12))
+        if self.axial:
+            u = self.arm / np.linalg.norm(self.arm)
+            b[0, :3], b[0, 6:9] = u, -u
+            return b, np.array([self.k[0], 0, 0, 0, 0, 0])
+        b[:3, :3], b[:3, 6:9], b[:3, 9:] = np.eye(3), -np.eye(3), skew(self.arm)
+        b[3:, 3:6], b[3:, 9:] = np.eye(3), -np.eye(3)
+        return b, np.concatenate([self.k, self.kr])
+
+
+# ---- a scene ---------------------------------------------------------------------------------------------------------
+
+
+class Slave:
+    pass
+
+
+class Problem:
+    """A scene ready to compute. Nodes (masters and points) and slaves stand in the order of ascending id."""
+
+    def __init__(self, scene):
+        self.model = {"inertia": "lumped", "reaction": "loads", "geometry": "finite", "gravity": [0, 0, 0]}
+        self.model |= scene.get("model", {})
+        self.gravity = np.asarray(self.model["gravity"], float)
+        where = {row[0]: np.array(row[1:], float) for row in scene["mesh"]["nodes"]}
+        pick = lambda which, everything: list(everything) if which == "all" else list(which)
+        about = {i: {} for i in where}
+        for table in scene.get("node", []):
+            for i in pick(table["nodes"], where):
+                about[i] |= {k: v for k, v in table.items() if k != "nodes"}
+        segment_nodes = {row[0]: list(row[1:]) for row in scene["mesh"].get("segments", [])}
+
+        found = []  # (slave id, tie, corner ids, projection)
+        for tie in scene.get("tie", []):
+            segment_ids = sorted(pick(tie["segments"], segment_nodes))
+            ids = sorted({n for e in segment_ids for n in segment_nodes[e]})
+            index = {n: k for k, n in enumerate(ids)}
+            position = np.array([where[n] for n in ids])
+            segments = [tuple(index[n] for n in segment_nodes[e]) for e in segment_ids]
+            reach = tie.get("search_distance", 0) or default_search_distance(position, segments)
+            for i in tie["slaves"]:
+                e, p = find(position, segments, segment_ids, where[i], tie.get("search", "box"), reach)
+                if e is None:
+                    raise ValueError(f"slave {i} not found")
+                found.append((i, tie, segment_nodes[segment_ids[e]], segment_ids[e], p))
+        found.sort(key=lambda f: f[0])
+        slave_ids = [f[0] for f in found]
+        self.masters = sorted({n for f in found for n in f[2]})
+        held = set(self.masters)
+        for spring in scene.get("spring", []):
+            held |= set(spring.get("nodes", [])) | set(spring.get("ground", []))
+        self.ids = sorted(held - set(slave_ids))
+        self.index = {i: k for k, i in enumerate(self.ids)}
+        number = lambda key, ids: np.array([float(about[i].get(key, 0)) for i in ids])
+        self.x0 = np.array([where[i] for i in self.ids]).reshape(-1, 3)
+        self.mass, self.inertia = number("mass", self.ids), number("inertia", self.ids)
+        self.rotating = np.array([bool(about[i].get("rotations", False)) for i in self.ids])
+        self.motion = np.array([about[i].get("motion", "driven") for i in self.ids])
+        self.v0, self.w0 = np.zeros_like(self.x0), np.zeros_like(self.x0)
+        for table in scene.get("initial", []):
+            for i in pick(table["nodes"], self.ids):
+                self.v0[self.index[i]] = table.get("v", [0, 0, 0])
+                self.w0[self.index[i]] = table.get("w", [0, 0, 0])
+        self.slaves = [self._slave(f, about[f[0]], where[f[0]]) for f in found]
+        self.slave_index = {i: k for k, i in enumerate(slave_ids)}
+        self.springs = []
+        for table in scene.get("spring", []):
+            pairs = [tuple(table["nodes"])] if "nodes" in table else [(i, None) for i in table["ground"]]
+            for a, b in pairs:
+                xb = where[a] if b is None else where[b]
+                self.springs.append(Spring(table, self._end(a), self._end(b), where[a], xb))
+        self.free = np.zeros((len(self.ids), 6), bool)
+        self.free[self.motion == "free", :3] = True
+        self.free[(self.motion == "free") & self.rotating, 3:] = True
+        self.free = self.free.ravel()
+
+    def _end(self, i):
+        if i is None:
+            return None
+        return ("slave", self.slave_index[i]) if i in self.slave_index else ("node", self.index[i])
+
+    def _slave(self, found, about, x):
+        s = Slave()
+        s.id, tie, corner_ids, s.segment, s.projection = found
+        s.nodes = [self.index[n] for n in corner_ids]
+        s.optimized = tie.get("formulation", "default") == "optimized"
+        corners = self.x0[s.nodes]
+        s.d0 = x - (corners.mean(axis=0) if s.optimized else s.projection.point)
+        s.phi = s.projection.phi
+        s.turns = s.optimized or bool(np.all(self.rotating[s.nodes]))
+        s.mass, s.inertia = float(about.get("mass", 0)), float(about.get("inertia", 0))
+        s.frozen = mean_inertia(corners)
+        s.added = lumped(corners, s.projection, np.linalg.norm(s.d0), s.optimized, s.mass, s.inertia)
+        if not s.turns:
+            s.added[:, 1] = 0
+        return s
+
+    def added(self):
+        """D: added (mass, inertia) per node, (N, 2)."""
+        total = np.zeros((len(self.ids), 2))
+        for s in self.slaves:
+            np.add.at(total, s.nodes, s.added)
+        return total
+
+    # -- kinematics
+
+    def maps(self, x, v, w, offsets):
+        """T (6 S, 6 N) and b (6 S,) for offsets d (S, 3)."""
+        small = self.model["geometry"] == "small"
+        total, bias = np.zeros((6 * len(self.slaves), 6 * len(self.ids))), np.zeros(6 * len(self.slaves))
+        for k, s in enumerate(self.slaves):
+            corners = self.x0[s.nodes] if small else x[s.nodes]
+            rows, d = slice(6 * k, 6 * k + 6), offsets[k]
+            if s.optimized:
+                t = optimized_map(corners, d)
+                b = optimized_bias(corners, v[s.nodes], d)
+            else:
+                t = default_map(s.phi, d, s.turns)
+                b = default_bias(s.phi, w[s.nodes], d) if s.turns else np.zeros(6)
+            for c, n in enumerate(s.nodes):
+                total[rows, 6 * n : 6 * n + 6] += t[:, 6 * c : 6 * c + 6]
+            bias[rows] = 0 if small else b
+        return total, bias
+
+    def slave_masses(self):
+        return np.concatenate([[s.mass] * 3 + [s.inertia if s.turns else 0.0] * 3 for s in self.slaves] or [[]])
+
+    def node_masses(self):
+        return np.column_stack([self.mass] * 3 + [np.where(self.rotating, self.inertia, 0)] * 3).ravel()
+
+    def added_masses(self):
+        d = self.added()
+        return np.column_stack([d[:, :1]] * 3 + [d[:, 1:]] * 3).ravel()
+
+    def mass_matrix(self, t):
+        if self.model["inertia"] == "lumped":
+            return np.diag(self.node_masses() + self.added_masses())
+        return np.diag(self.node_masses()) + t.T @ (self.slave_masses()[:, None] * t)
+
+    # -- one instant
+
+    def unpack(self, y):
+        """x, v, w (N, 3), node and slave quaternions, slave positions or None (small geometry integrates them)."""
+        n, s = len(self.ids), len(self.slaves)
+        cuts = np.cumsum([3 * n, 3 * n, 3 * n, 4 * n, 4 * s])
+        x, v, w, qn, qs, xs = np.split(y, cuts)
+        return (x.reshape(-1, 3), v.reshape(-1, 3), w.reshape(-1, 3), qn.reshape(-1, 4), qs.reshape(-1, 4),
+                xs.reshape(-1, 3))
+
+    def start(self):
+        one = np.array([1.0, 0, 0, 0])
+        n, s = len(self.ids), len(self.slaves)
+        _, xs = self.offsets(self.x0, np.tile(one, (s, 1)), None)
+        y = [self.x0.ravel(), self.v0.ravel(), self.w0.ravel(), np.tile(one, n), np.tile(one, s)]
+        return np.concatenate(y + ([xs.ravel()] if self.model["geometry"] == "small" else []))
+
+    def offsets(self, x, qs, xs):
+        """d and slave positions, (S, 3) each."""
+        d, place = np.zeros((len(self.slaves), 3)), np.zeros((len(self.slaves), 3))
+        for k, s in enumerate(self.slaves):
+            turned = s.turns and self.model["geometry"] == "finite"
+            d[k] = rotation_matrix(qs[k]) @ s.d0 if turned else s.d0
+            place[k] = d[k] + (x[s.nodes].mean(axis=0) if s.optimized else s.phi @ x[s.nodes])
+        if xs is not None and len(xs):
+            place = xs
+        return d, place
+
+    def evaluate(self, t, y, inputs=None):
+        """Everything at one instant, as a dict. inputs: {("f", "t", "v", "w", "a" or "z", node id): function of t}."""
+        inputs = inputs or {}
+        x, v, w, qn, qs, xs = self.unpack(y)
+        v, w, acc = v.copy(), w.copy(), np.zeros((len(self.ids), 6))
+        node_load, slave_load = np.zeros((len(self.ids), 6)), np.zeros((len(self.slaves), 6))
+        for (kind, i), value in inputs.items():
+            value = value(t)
+            if kind in "ft":
+                load, k = (slave_load, self.slave_index[i]) if i in self.slave_index else (node_load, self.index[i])
+                load[k, :3] += value if kind == "f" else 0
+                load[k, 3:] += value if kind == "t" else 0
+            else:
+                target = {"v": v, "w": w, "a": acc[:, :3], "z": acc[:, 3:]}[kind]
+                target[self.index[i]] = value
+        d, place = self.offsets(x, qs, xs)
+        tmap, bias = self.maps(x, v, w, d)
+        twist = (tmap @ np.hstack([v, w]).ravel()).reshape(-1, 6)
+        outside = float(np.sum(node_load * np.hstack([v, w])) + np.sum(slave_load * twist))
+        strain = dissipation = 0.0
+        one = np.array([1.0, 0, 0, 0])
+        state = {"node": (x, v, qn, w, node_load), "slave": (place, twist[:, :3], qs, twist[:, 3:], slave_load)}
+        for spring in self.springs:
+            ends = []
+            for end in (spring.a, spring.b):
+                if end is None:
+                    ends.append((spring.anchor, np.zeros(3), one, np.zeros(3)))
+                else:
+                    ends.append(tuple(part[end[1]] for part in state[end[0]][:4]))
+            (x1, v1, q1, w1), (x2, v2, q2, w2) = ends
+            on_a, on_b, energy, power = spring.load(x1, x2, v1, v2, q1, q2, w1, w2)
+            strain, dissipation = strain + energy, dissipation + power
+            for end, load in ((spring.a, on_a), (spring.b, on_b)):
+                if end is not None:
+                    state[end[0]][4][end[1]] += load
+        for k, s in enumerate(self.slaves):
+            slave_load[k, :3] += s.mass * self.gravity
+        own = node_load.copy()
+        own[:, :3] += self.mass[:, None] * self.gravity
+        consistent = self.model["inertia"] == "consistent"
+        m = self.mass_matrix(tmap)
+        ms = self.slave_masses()
+        right = own.ravel() + tmap.T @ (slave_load.ravel() - (ms * bias if consistent else 0))
+        a, free = acc.ravel(), self.free
+        if free.any():
+            a[free] = np.linalg.solve(m[np.ix_(free, free)], (right - m[:, ~free] @ a[~free])[free])
+        loads = tmap.T @ slave_load.ravel()
+        if consistent:
+            full = loads - tmap.T @ (ms * (tmap @ a + bias))
+            kinetic = 0.5 * (self.node_masses() @ np.hstack([v, w]).ravel() ** 2 + ms @ twist.ravel() ** 2)
+        else:
+            full = loads - self.added_masses() * a
+            kinetic = 0.5 * (self.node_masses() + self.added_masses()) @ np.hstack([v, w]).ravel() ** 2
+        reaction = {"loads": loads, "full": full, "split": full + self.added_masses() * a}
+        return {"x": x, "v": v, "w": w, "a": a.reshape(-1, 6), "slave_x": place, "slave_v": twist[:, :3],
+                "slave_w": twist[:, 3:], "slave_a": (tmap @ a + bias).reshape(-1, 6), "d": d, "T": tmap, "b": bias,
+                "reaction": {k: r.reshape(-1, 6) for k, r in reaction.items()}, "kinetic": kinetic, "strain": strain,
+                "dissipation": dissipation, "external": outside}
+
+    def rate(self, t, y, inputs):
+        now = self.evaluate(t, y, inputs)
+        _, _, _, qn, qs, _ = self.unpack(y)
+        a = np.where(self.free, now["a"].ravel(), 0).reshape(-1, 6)
+        parts = [now["v"].ravel(), a[:, :3].ravel(), a[:, 3:].ravel()]
+        parts += [quaternion_rate(q, w) for q, w in zip(qn, now["w"])]
+        parts += [quaternion_rate(q, w) for q, w in zip(qs, now["slave_w"])]
+        if self.model["geometry"] == "small":
+            parts.append(now["slave_v"].ravel())
+        return np.concatenate(parts)
+
+    def solve(self, times, inputs=None, rtol=1e-12, atol=1e-15):
+        """List of `evaluate` dicts at the times, integrated from times[0] by DOP853."""
+        answer = solve_ivp(self.rate, (times[0], times[-1]), self.start(), method="DOP853", t_eval=times, rtol=rtol,
+                           atol=atol, args=(inputs,))
+        assert answer.success, answer.message
+        return [self.evaluate(t, y, inputs) for t, y in zip(times, answer.y.T)]
+
+    # -- stability (THEORY 6)
+
+    def omega_max(self):
+        """rad/s: the highest frequency of the free nodes at the start."""
+        t, _ = self.maps(self.x0, 0 * self.x0, 0 * self.x0, np.array([s.d0 for s in self.slaves]).reshape(-1, 3))
+        n = 6 * len(self.ids)
+        everything = np.vstack([np.eye(n), t])  # nodes, then slaves
+        stiffness = np.zeros((n, n))
+        for spring in self.springs:
+            rows = []
+            for end in (spring.a, spring.b):
+                first = None if end is None else 6 * end[1] + (n if end[0] == "slave" else 0)
+                rows.append(np.zeros((6, n)) if first is None else everything[first : first + 6])
+            strain, k = spring.strain_map()
+            strain = strain @ np.vstack(rows)
+            stiffness += strain.T @ (k[:, None] * strain)
+        pick = np.ix_(self.free, self.free)
+        return np.sqrt(eigh(stiffness[pick], self.mass_matrix(t)[pick], eigvals_only=True)[-1])
