@@ -43,7 +43,9 @@ struct TieGroup {
 struct SpringEnd {
   int node = -1;
   int slave = -1;
-  int orientation = -1;  // index into Model::oriented, where the spring needs the end's rotation
+  // Where the spring needs the end's rotation: which unit quaternion, counted through the meanMotion segments (all
+  // groups), then Model::oriented.
+  int orientation = -1;
 };
 
 struct Spring {
@@ -58,6 +60,12 @@ struct Spring {
 struct Finding {  // one line of the tie report
   enum Kind { warning, note } kind;
   std::string text;
+};
+
+struct Dropped {  // a slave that its tie's search did not find
+  std::int64_t id;
+  int tie;
+  std::string reason;
 };
 
 struct SlaveReport {
@@ -89,6 +97,7 @@ struct Model {
   std::vector<double> slavePosition;       // 3 per slave
   std::vector<double> slaveOffset;         // 3 per slave: d at the start
   std::vector<double> slaveMass, slaveInertia, slaveStiffness, slaveRotationalStiffness;
+  int turningSlaves = 0;                   // how many can turn
   std::vector<TieGroup> groups;            // in slave order: rotation, meanMotion, translation; quads before triangles
 
   std::vector<Spring> springs;
@@ -98,6 +107,8 @@ struct Model {
   std::vector<std::string> tieName;
   std::vector<SlaveReport> slaveReport;    // in slave order
   std::vector<Finding> findings;
+  std::vector<Dropped> dropped;
+  std::vector<std::int64_t> leftOut;       // nodes that no tie and no spring uses
 
   int nodes() const { return begin[nodeGroups]; }
   int rotating() const { return begin[freeMaster]; }
@@ -106,7 +117,6 @@ struct Model {
   int free() const { return freeEnd() - freeBegin(); }
   int slaves() const { return static_cast<int>(slaveId.size()); }
   int turning() const { return turningSlaves; }
-  int turningSlaves = 0;
   bool anyFree() const { return free() > 0; }
   bool anyDriven() const;
   bool isMaster(int group) const { return group % 2 == 0; }

@@ -1,0 +1,426 @@
+#include "tie.hpp"
+
+// One source for every instruction set: four doubles are two SSE registers, one AVX register, as the clone is compiled
+// for. No clone may contract multiplications and additions (-ffp-contract=off), so all give the same bits.
+#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && defined(__linux__) && \
+    !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+#define TIEFMU_CLONES __attribute__((target_clones("arch=x86-64-v4", "arch=x86-64-v3", "default")))
+#else
+#define TIEFMU_CLONES
+#endif
+#define TIEFMU_INLINE inline __attribute__((always_inline))
+#pragma GCC diagnostic ignored "-Wpsabi"  // packs never cross a call that is not inlined
+
+namespace tiefmu {
+namespace {
+
+// x, y, z and a spare zero.
+using Pack = double __attribute__((vector_size(32)));
+using Lanes = long long __attribute__((vector_size(32)));
+
+TIEFMU_INLINE Pack load(const double* p) { return Pack{p[0], p[1], p[2], 0}; }
+TIEFMU_INLINE void store(double* p, Pack a) {
+  p[0] = a[0];
+  p[1] = a[1];
+  p[2] = a[2];
+}
+TIEFMU_INLINE Pack yzx(Pack a) { return __builtin_shuffle(a, Lanes{1, 2, 0, 3}); }
+TIEFMU_INLINE Pack cross(Pack a, Pack b) { return yzx(a * yzx(b) - yzx(a) * b); }
+TIEFMU_INLINE double dot(Pack a, Pack b) {
+  const Pack p = a * b;
+  return p[0] + p[1] + p[2];
+}
+TIEFMU_INLINE Pack symmetric(const double* m, Pack a) {
+  return Pack{m[0], m[1], m[2], 0} * a[0] + Pack{m[1], m[3], m[4], 0} * a[1] + Pack{m[2], m[4], m[5], 0} * a[2];
+}
+
+template <int N>
+struct Corners {
+  const int* node;
+  TIEFMU_INLINE void gather(const double* field, Pack* to) const {
+    for (int i = 0; i < N; ++i) to[i] = load(field + 3 * static_cast<std::ptrdiff_t>(node[i]));
+  }
+  TIEFMU_INLINE void add(const Pack* from, double* field) const {
+    for (int i = 0; i < N; ++i) {
+      double* p = field + 3 * static_cast<std::ptrdiff_t>(node[i]);
+      store(p, load(p) + from[i]);
+    }
+  }
+};
+
+template <int N>
+TIEFMU_INLINE Pack weighted(const double* phi, const Pack* u) {
+  Pack sum = phi[0] * u[0];
+  for (int i = 1; i < N; ++i) sum += phi[i] * u[i];
+  return sum;
+}
+
+template <int N>
+TIEFMU_INLINE Pack mean(const Pack* u) {
+  Pack sum = u[0];
+  for (int i = 1; i < N; ++i) sum += u[i];
+  return sum * (1.0 / N);
+}
+
+template <int N>
+TIEFMU_INLINE Pack rigidSpin(const double* arm, const double* inverse, const Pack* v) {
+  Pack sum = cross(load(arm), v[0]);
+  for (int i = 1; i < N; ++i) sum += cross(load(arm + 3 * i), v[i]);
+  return symmetric(inverse, sum);
+}
+
+// Arms from the centre of the nodes, and Ibar^-1.
+template <int N>
+TIEFMU_INLINE void frameOf(const Pack* x, SegmentFrame& frame) {
+  const Pack centre = mean<N>(x);
+  double xx = 0, xy = 0, xz = 0, yy = 0, yz = 0, zz = 0;
+  for (int i = 0; i < N; ++i) {
+    const Pack r = x[i] - centre;
+    store(frame.arm + 3 * i, r);
+    xx += r[0] * r[0];
+    xy += r[0] * r[1];
+    xz += r[0] * r[2];
+    yy += r[1] * r[1];
+    yz += r[1] * r[2];
+    zz += r[2] * r[2];
+  }
+  store(frame.centre, centre);
+  const double a = yy + zz, b = -xy, c = -xz, d = xx + zz, e = -yz, f = xx + yy;
+  const double A = d * f - e * e, B = c * e - b * f, C = b * e - c * d;
+  const double s = 1.0 / (a * A + b * B + c * C);
+  frame.inverse[0] = s * A;
+  frame.inverse[1] = s * B;
+  frame.inverse[2] = s * C;
+  frame.inverse[3] = s * (a * f - c * c);
+  frame.inverse[4] = s * (b * c - a * e);
+  frame.inverse[5] = s * (a * d - b * b);
+}
+
+// Calls body(segment, corners, first slave, last slave) over a range; slaves as indices of the slave arrays.
+template <int N, class Body>
+TIEFMU_INLINE void eachSegment(const TieGroup& group, SegmentRange range, Body body) {
+  const int* node = group.node.data();
+  const int* begin = group.begin.data();
+  for (int e = range.first; e < range.last; ++e)
+    body(e, Corners<N>{node + N * static_cast<std::ptrdiff_t>(e)},
+         static_cast<std::ptrdiff_t>(group.firstSlave) + begin[e],
+         static_cast<std::ptrdiff_t>(group.firstSlave) + begin[e + 1]);
+}
+
+template <int N>
+TIEFMU_INLINE void followTranslation(const TieGroup& group, SegmentRange range, const double* u, double* us) {
+  const double* weight = group.weight.data() - N * static_cast<std::ptrdiff_t>(group.firstSlave);
+  eachSegment<N>(group, range, [&](int, Corners<N> corners, std::ptrdiff_t s, std::ptrdiff_t last) {
+    Pack ui[N];
+    corners.gather(u, ui);
+    for (; s < last; ++s) store(us + 3 * s, weighted<N>(weight + N * s, ui));
+  });
+}
+
+template <int N>
+TIEFMU_INLINE void followRotation(const TieGroup& group, SegmentRange range, const double* offset, const double* u,
+                                  const double* turn, double* us, double* turns) {
+  const double* weight = group.weight.data() - N * static_cast<std::ptrdiff_t>(group.firstSlave);
+  eachSegment<N>(group, range, [&](int, Corners<N> corners, std::ptrdiff_t s, std::ptrdiff_t last) {
+    Pack ui[N], wi[N];
+    corners.gather(u, ui);
+    corners.gather(turn, wi);
+    for (; s < last; ++s) {
+      const Pack w = weighted<N>(weight + N * s, wi);
+      store(us + 3 * s, weighted<N>(weight + N * s, ui) + cross(w, load(offset + 3 * s)));
+      store(turns + 3 * s, w);
+    }
+  });
+}
+
+template <int N>
+TIEFMU_INLINE void followMeanMotion(const TieGroup& group, SegmentRange range, TieGeometry geometry, const double* u,
+                                    double* us, double* turns) {
+  eachSegment<N>(group, range, [&](int e, Corners<N> corners, std::ptrdiff_t s, std::ptrdiff_t last) {
+    Pack ui[N];
+    corners.gather(u, ui);
+    const Pack w = rigidSpin<N>(geometry.frame[e].arm, geometry.frame[e].inverse, ui), centre = mean<N>(ui);
+    for (; s < last; ++s) {
+      store(us + 3 * s, centre + cross(w, load(geometry.offset + 3 * s)));
+      store(turns + 3 * s, w);
+    }
+  });
+}
+
+template <int N>
+TIEFMU_INLINE void distributeTranslation(const TieGroup& group, SegmentRange range, const double* force, double* f) {
+  const double* weight = group.weight.data() - N * static_cast<std::ptrdiff_t>(group.firstSlave);
+  eachSegment<N>(group, range, [&](int, Corners<N> corners, std::ptrdiff_t s, std::ptrdiff_t last) {
+    Pack fi[N] = {};
+    for (; s < last; ++s) {
+      const Pack F = load(force + 3 * s);
+      for (int i = 0; i < N; ++i) fi[i] += weight[N * s + i] * F;
+    }
+    corners.add(fi, f);
+  });
+}
+
+template <int N>
+TIEFMU_INLINE void distributeRotation(const TieGroup& group, SegmentRange range, const double* offset,
+                                      const double* force, const double* moment, double* f, double* t) {
+  const double* weight = group.weight.data() - N * static_cast<std::ptrdiff_t>(group.firstSlave);
+  eachSegment<N>(group, range, [&](int, Corners<N> corners, std::ptrdiff_t s, std::ptrdiff_t last) {
+    Pack fi[N] = {}, ti[N] = {};
+    for (; s < last; ++s) {
+      const Pack F = load(force + 3 * s);
+      const Pack M = load(moment + 3 * s) + cross(load(offset + 3 * s), F);
+      for (int i = 0; i < N; ++i) {
+        fi[i] += weight[N * s + i] * F;
+        ti[i] += weight[N * s + i] * M;
+      }
+    }
+    corners.add(fi, f);
+    corners.add(ti, t);
+  });
+}
+
+template <int N>
+TIEFMU_INLINE void distributeMeanMotion(const TieGroup& group, SegmentRange range, TieGeometry geometry,
+                                        const double* force, const double* moment, double* f) {
+  eachSegment<N>(group, range, [&](int e, Corners<N> corners, std::ptrdiff_t s, std::ptrdiff_t last) {
+    Pack F = {}, M = {};
+    for (; s < last; ++s) {
+      const Pack load1 = load(force + 3 * s);
+      F += load1;
+      M += load(moment + 3 * s) + cross(load(geometry.offset + 3 * s), load1);
+    }
+    const Pack A = symmetric(geometry.frame[e].inverse, M), share = F * (1.0 / N);
+    Pack fi[N];
+    for (int i = 0; i < N; ++i) fi[i] = share + cross(A, load(geometry.frame[e].arm + 3 * i));
+    corners.add(fi, f);
+  });
+}
+
+template <int N>
+TIEFMU_INLINE void biasRotation(const TieGroup& group, SegmentRange range, const double* offset, const double* spin,
+                                double* as) {
+  const double* weight = group.weight.data() - N * static_cast<std::ptrdiff_t>(group.firstSlave);
+  eachSegment<N>(group, range, [&](int, Corners<N> corners, std::ptrdiff_t s, std::ptrdiff_t last) {
+    Pack wi[N];
+    corners.gather(spin, wi);
+    for (; s < last; ++s) {
+      const Pack w = weighted<N>(weight + N * s, wi);
+      store(as + 3 * s, load(as + 3 * s) + cross(w, cross(w, load(offset + 3 * s))));
+    }
+  });
+}
+
+// z_b = -Ibar^-1 (dIbar/dt) w, dIbar/dt = sum 2 (r.r') 1 - r' r^T - r r'^T.
+template <int N>
+TIEFMU_INLINE void biasMeanMotion(const TieGroup& group, SegmentRange range, TieGeometry geometry, const double* v,
+                                  double* as, double* zs) {
+  eachSegment<N>(group, range, [&](int e, Corners<N> corners, std::ptrdiff_t s, std::ptrdiff_t last) {
+    Pack vi[N];
+    corners.gather(v, vi);
+    const SegmentFrame& frame = geometry.frame[e];
+    const Pack w = rigidSpin<N>(frame.arm, frame.inverse, vi), centre = mean<N>(vi);
+    Pack rate = {};
+    for (int i = 0; i < N; ++i) {
+      const Pack r = load(frame.arm + 3 * i), rDot = vi[i] - centre;
+      rate += 2 * dot(r, rDot) * w - dot(r, w) * rDot - dot(rDot, w) * r;
+    }
+    const Pack z = -symmetric(frame.inverse, rate);
+    for (; s < last; ++s) {
+      const Pack d = load(geometry.offset + 3 * s);
+      store(as + 3 * s, load(as + 3 * s) + cross(z, d) + cross(w, cross(w, d)));
+      store(zs + 3 * s, load(zs + 3 * s) + z);
+    }
+  });
+}
+
+template <int N>
+TIEFMU_INLINE void placeWeighted(const TieGroup& group, SegmentRange range, const double* offset, const double* x,
+                                 double* xs) {
+  const double* weight = group.weight.data() - N * static_cast<std::ptrdiff_t>(group.firstSlave);
+  eachSegment<N>(group, range, [&](int, Corners<N> corners, std::ptrdiff_t s, std::ptrdiff_t last) {
+    Pack xi[N];
+    corners.gather(x, xi);
+    for (; s < last; ++s) store(xs + 3 * s, weighted<N>(weight + N * s, xi) + load(offset + 3 * s));
+  });
+}
+
+template <int N>
+TIEFMU_INLINE void placeMeanMotion(const TieGroup& group, SegmentRange range, const double* offset, const double* x,
+                                   double* xs) {
+  eachSegment<N>(group, range, [&](int, Corners<N> corners, std::ptrdiff_t s, std::ptrdiff_t last) {
+    Pack xi[N];
+    corners.gather(x, xi);
+    const Pack centre = mean<N>(xi);
+    for (; s < last; ++s) store(xs + 3 * s, centre + load(offset + 3 * s));
+  });
+}
+
+// d + sin(a)/a (angle x d) + (1 - cos a)/a^2 angle x (angle x d), a = |angle| [Rodrigues]
+TIEFMU_INLINE Pack rotated(Pack angle, Pack d) {
+  const double a2 = dot(angle, angle);
+  double s, c;
+  if (a2 < 0.1) {  // the terms left out are below 1e-17
+    s = 1 - a2 / 6 * (1 - a2 / 20 * (1 - a2 / 42 * (1 - a2 / 72 * (1 - a2 / 110))));
+    c = 0.5 * (1 - a2 / 12 * (1 - a2 / 30 * (1 - a2 / 56 * (1 - a2 / 90 * (1 - a2 / 132)))));
+  } else {
+    const double a = std::sqrt(a2), half = std::sin(0.5 * a);
+    s = std::sin(a) / a;
+    c = 2 * half * half / a2;
+  }
+  const Pack once = cross(angle, d);
+  return d + s * once + c * cross(angle, once);
+}
+
+template <int N>
+TIEFMU_INLINE void turnOffsetsN(const TieGroup& group, SegmentRange range, double h, const double* spin,
+                                const double* inverseLength2, double* offset) {
+  const double* weight = group.weight.data() - N * static_cast<std::ptrdiff_t>(group.firstSlave);
+  eachSegment<N>(group, range, [&](int, Corners<N> corners, std::ptrdiff_t s, std::ptrdiff_t last) {
+    Pack wi[N];
+    corners.gather(spin, wi);
+    for (int i = 0; i < N; ++i) wi[i] *= h;
+    for (; s < last; ++s) {
+      const Pack d = rotated(weighted<N>(weight + N * s, wi), load(offset + 3 * s));
+      // One Newton step of 1/sqrt: exact, as the length is off by rounding only.
+      store(offset + 3 * s, (1.5 - 0.5 * dot(d, d) * inverseLength2[s]) * d);
+    }
+  });
+}
+
+template <int N>
+TIEFMU_INLINE void turnSegmentsN(const TieGroup& group, SegmentRange range, double h, const double* x, const double* v,
+                                 double* rotation) {
+  eachSegment<N>(group, range, [&](int e, Corners<N> corners, std::ptrdiff_t, std::ptrdiff_t) {
+    Pack xi[N], vi[N];
+    corners.gather(x, xi);
+    corners.gather(v, vi);
+    for (int i = 0; i < N; ++i) xi[i] += (0.5 * h) * vi[i];
+    SegmentFrame frame;
+    frameOf<N>(xi, frame);
+    const Pack w = h * rigidSpin<N>(frame.arm, frame.inverse, vi);
+    double* q = rotation + 4 * static_cast<std::ptrdiff_t>(e);
+    const Quat next = exponential(Vec3(w[0], w[1], w[2])) * Quat(q[0], q[1], q[2], q[3]);
+    const double scale = 1.5 - 0.5 * next.squaredNorm();
+    q[0] = scale * next.w();
+    q[1] = scale * next.x();
+    q[2] = scale * next.y();
+    q[3] = scale * next.z();
+  });
+}
+
+}  // namespace
+
+// The public kernels choose the coupling and the number of corners, once per call.
+
+TIEFMU_CLONES void follow(const TieGroup& group, SegmentRange range, TieGeometry geometry, const double* u,
+                          const double* turn, double* us, double* turns) {
+  const bool quads = group.corners == 4;
+  switch (group.coupling) {
+    case Coupling::translation:
+      return quads ? followTranslation<4>(group, range, u, us) : followTranslation<3>(group, range, u, us);
+    case Coupling::rotation:
+      return quads ? followRotation<4>(group, range, geometry.offset, u, turn, us, turns)
+                   : followRotation<3>(group, range, geometry.offset, u, turn, us, turns);
+    case Coupling::meanMotion:
+      return quads ? followMeanMotion<4>(group, range, geometry, u, us, turns)
+                   : followMeanMotion<3>(group, range, geometry, u, us, turns);
+  }
+}
+
+TIEFMU_CLONES void distribute(const TieGroup& group, SegmentRange range, TieGeometry geometry, const double* force,
+                              const double* moment, double* f, double* t) {
+  const bool quads = group.corners == 4;
+  switch (group.coupling) {
+    case Coupling::translation:
+      return quads ? distributeTranslation<4>(group, range, force, f)
+                   : distributeTranslation<3>(group, range, force, f);
+    case Coupling::rotation:
+      return quads ? distributeRotation<4>(group, range, geometry.offset, force, moment, f, t)
+                   : distributeRotation<3>(group, range, geometry.offset, force, moment, f, t);
+    case Coupling::meanMotion:
+      return quads ? distributeMeanMotion<4>(group, range, geometry, force, moment, f)
+                   : distributeMeanMotion<3>(group, range, geometry, force, moment, f);
+  }
+}
+
+TIEFMU_CLONES void addBias(const TieGroup& group, SegmentRange range, TieGeometry geometry, const double* velocity,
+                           const double* spin, double* as, double* zs) {
+  const bool quads = group.corners == 4;
+  switch (group.coupling) {
+    case Coupling::translation:
+      return;
+    case Coupling::rotation:
+      return quads ? biasRotation<4>(group, range, geometry.offset, spin, as)
+                   : biasRotation<3>(group, range, geometry.offset, spin, as);
+    case Coupling::meanMotion:
+      return quads ? biasMeanMotion<4>(group, range, geometry, velocity, as, zs)
+                   : biasMeanMotion<3>(group, range, geometry, velocity, as, zs);
+  }
+}
+
+TIEFMU_CLONES void place(const TieGroup& group, SegmentRange range, TieGeometry geometry, const double* position,
+                         double* xs) {
+  const bool quads = group.corners == 4;
+  if (group.coupling == Coupling::meanMotion)
+    return quads ? placeMeanMotion<4>(group, range, geometry.offset, position, xs)
+                 : placeMeanMotion<3>(group, range, geometry.offset, position, xs);
+  return quads ? placeWeighted<4>(group, range, geometry.offset, position, xs)
+               : placeWeighted<3>(group, range, geometry.offset, position, xs);
+}
+
+TIEFMU_CLONES void updateFrames(const TieGroup& group, SegmentRange range, const double* position,
+                                SegmentFrame* frame) {
+  const auto update = [&](auto n) {
+    constexpr int N = decltype(n)::value;
+    eachSegment<N>(group, range, [&](int e, Corners<N> corners, std::ptrdiff_t, std::ptrdiff_t) {
+      Pack x[N];
+      corners.gather(position, x);
+      frameOf<N>(x, frame[e]);
+    });
+  };
+  if (group.corners == 4) update(std::integral_constant<int, 4>{});
+  else update(std::integral_constant<int, 3>{});
+}
+
+TIEFMU_CLONES void turnOffsets(const TieGroup& group, SegmentRange range, double h, const double* spin,
+                               const double* inverseLength2, double* offset) {
+  return group.corners == 4 ? turnOffsetsN<4>(group, range, h, spin, inverseLength2, offset)
+                            : turnOffsetsN<3>(group, range, h, spin, inverseLength2, offset);
+}
+
+TIEFMU_CLONES void turnSegments(const TieGroup& group, SegmentRange range, double h, const double* position,
+                                const double* velocity, double* rotation) {
+  return group.corners == 4 ? turnSegmentsN<4>(group, range, h, position, velocity, rotation)
+                            : turnSegmentsN<3>(group, range, h, position, velocity, rotation);
+}
+
+TIEFMU_CLONES void rotateOffsets(const TieGroup& group, SegmentRange range, const double* rotation,
+                                 const double* initialOffset, double* offset) {
+  for (int e = range.first; e < range.last; ++e) {
+    const double* q = rotation + 4 * static_cast<std::ptrdiff_t>(e);
+    const double w = q[0], x = q[1], y = q[2], z = q[3];
+    const Pack c0 = {1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y), 0};
+    const Pack c1 = {2 * (x * y - w * z), 1 - 2 * (x * x + z * z), 2 * (y * z + w * x), 0};
+    const Pack c2 = {2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y), 0};
+    for (std::ptrdiff_t s = group.firstSlave + group.begin[e]; s < group.firstSlave + group.begin[e + 1]; ++s) {
+      const double* d0 = initialOffset + 3 * s;
+      store(offset + 3 * s, c0 * d0[0] + c1 * d0[1] + c2 * d0[2]);
+    }
+  }
+}
+
+TIEFMU_CLONES void meanSpin(const TieGroup& group, SegmentRange range, const SegmentFrame* frame,
+                            const double* velocity, double* spin) {
+  const auto compute = [&](auto n) {
+    constexpr int N = decltype(n)::value;
+    eachSegment<N>(group, range, [&](int e, Corners<N> corners, std::ptrdiff_t, std::ptrdiff_t) {
+      Pack v[N];
+      corners.gather(velocity, v);
+      store(spin + 3 * static_cast<std::ptrdiff_t>(e), rigidSpin<N>(frame[e].arm, frame[e].inverse, v));
+    });
+  };
+  if (group.corners == 4) compute(std::integral_constant<int, 4>{});
+  else compute(std::integral_constant<int, 3>{});
+}
+
+}  // namespace tiefmu

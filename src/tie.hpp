@@ -1,0 +1,70 @@
+// The tie itself: how slaves follow their masters (T) and how loads go back (T^T), THEORY 2 and 3.
+//
+// Every kernel works on the segments [first, last) of one group. Arrays are indexed as in Model: masters by node (3
+// doubles each), slaves by slave (3 doubles each); spin and moment arrays hold the leading rotating nodes and turning
+// slaves only. What belongs to a segment is computed once per segment.
+#pragma once
+
+#include <vector>
+
+#include "model.hpp"
+
+namespace tiefmu {
+
+// What a meanMotion segment needs of its present shape: arms r_i = x_i - C (m), centre C (m), Ibar^-1 (1/m2, xx xy xz
+// yy yz zz).
+struct SegmentFrame {
+  double arm[12];
+  double centre[3];
+  double inverse[6];
+};
+
+// Present geometry, as the kernels read it.
+struct TieGeometry {
+  const double* offset;         // 3 per slave: d
+  const SegmentFrame* frame;    // of the group's first segment; meanMotion only
+};
+
+struct SegmentRange {
+  int first, last;
+};
+
+// u_s = T u. `u`, `turn`: 3 per node / rotating node (velocity and spin, or acceleration, or displacement and small
+// rotation); writes `us` (3 per slave) and `turns` (3 per turning slave). [seed (4), (5)]
+void follow(const TieGroup& group, SegmentRange range, TieGeometry geometry, const double* u, const double* turn,
+            double* us, double* turns);
+
+// (f, t) += T^T (F, M): the transpose of `follow`. `force` 3 per slave, `moment` 3 per turning slave (N, N m), added
+// to `f` 3 per node and `t` 3 per rotating node. [seed figure 3 and (6)]
+void distribute(const TieGroup& group, SegmentRange range, TieGeometry geometry, const double* force,
+                const double* moment, double* f, double* t);
+
+// (a_s, z_s) += b, the part of the slaves' acceleration that is quadratic in velocities (THEORY 2).
+void addBias(const TieGroup& group, SegmentRange range, TieGeometry geometry, const double* velocity,
+             const double* spin, double* as, double* zs);
+
+// x_s: 3 per slave, from node positions and offsets (m).
+void place(const TieGroup& group, SegmentRange range, TieGeometry geometry, const double* position, double* xs);
+
+// Arms, centres and Ibar^-1 of meanMotion segments at these node positions.
+void updateFrames(const TieGroup& group, SegmentRange range, const double* position, SegmentFrame* frame);
+
+// Offsets of a rotation group turned by exp(h w_P), their length held at 1/sqrt(inverseLength2) to rounding.
+// `inverseLength2`: 1/d0^2 per slave, 0 for d0 = 0.
+void turnOffsets(const TieGroup& group, SegmentRange range, double h, const double* spin, const double* inverseLength2,
+                 double* offset);
+
+// Rotation of meanMotion segments advanced by exp(h w), w taken at mid step from nodes moving with `velocity`.
+// `rotation`: unit quaternion (w, x, y, z) per segment.
+void turnSegments(const TieGroup& group, SegmentRange range, double h, const double* position, const double* velocity,
+                  double* rotation);
+
+// d = R d0 for the slaves of meanMotion segments.
+void rotateOffsets(const TieGroup& group, SegmentRange range, const double* rotation, const double* initialOffset,
+                   double* offset);
+
+// Angular velocity of each meanMotion segment: w = Ibar^-1 sum r x v. `spin`: 3 per segment.
+void meanSpin(const TieGroup& group, SegmentRange range, const SegmentFrame* frame, const double* velocity,
+              double* spin);
+
+}  // namespace tiefmu
