@@ -41,31 +41,43 @@ class Projection:
         self.outside = np.max(1 - 2 * self.phi) if len(corners) == 3 else max(abs(xi), abs(eta))
 
 
-def project(corners, s):
-    """Triangle: the normal equations. Quad: damped Newton from the centre on half the squared distance."""
-    corners, s = np.asarray(corners, float), np.asarray(s, float)
-    if len(corners) == 3:
-        edges = (corners[1:] - corners[0]).T
-        xi, eta = np.linalg.lstsq(edges, s - corners[0], rcond=None)[0]
-        return Projection(corners, xi, eta, s)
-    twist = 0.25 * np.array([1, -1, 1, -1]) @ corners  # d2x / d xi d eta
-    half = lambda u: 0.5 * np.sum((shape(4, *u) @ corners - s) ** 2)
-    u = np.zeros(2)
+def local_coordinates(corners, s):
+    """(m, 2): xi, eta of the closest points on m segments, corners (m, n, 3), of m points s (m, 3).
+
+    Triangle: the normal equations. Quad: damped Newton from the centre on half the squared distance.
+    """
+    if corners.shape[1] == 3:
+        edges = np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2)
+        return np.einsum("mij,mj->mi", np.linalg.pinv(edges), s - corners[:, 0])
+    u = np.zeros((len(s), 2))
+    going = np.arange(len(s))
     for _ in range(200):
-        miss = shape(4, *u) @ corners - s
-        tangent = shape_gradient(4, *u) @ corners
-        gradient = tangent @ miss
-        hessian = tangent @ tangent.T
-        full = hessian + miss @ twist * np.array([[0, 1], [1, 0]])
+        x, target, at = corners[going], s[going], u[going]
+        miss = lambda at: np.einsum("nm,mnk->mk", shape(4, *at.T), x) - target
+        half = lambda at: 0.5 * np.sum(miss(at) ** 2, axis=1)
+        tangent = np.einsum("anm,mnk->mak", shape_gradient(4, *at.T), x)
+        gradient = np.einsum("mak,mk->ma", tangent, miss(at))
+        gauss_newton = tangent @ np.swapaxes(tangent, 1, 2)
+        cross = np.einsum("mk,n,mnk->m", miss(at), [0.25, -0.25, 0.25, -0.25], x)  # miss . d2x / d xi d eta
+        newton = gauss_newton + cross[:, None, None] * np.array([[0, 1], [1, 0]])
         # far from the surface the true Hessian can be indefinite; then Gauss-Newton still descends
-        descent = -np.linalg.solve(full if np.all(np.linalg.eigvalsh(full) > 0) else hessian, gradient)
-        if np.linalg.norm(descent) < 1e-15:
+        convex = np.linalg.eigvalsh(newton)[:, 0] > 0
+        hessian = np.where(convex[:, None, None], newton, gauss_newton)
+        move = -np.linalg.solve(hessian, gradient[..., None])[..., 0]
+        length = np.ones(len(going))
+        for _ in range(10):
+            uphill = (half(at + length[:, None] * move) > half(at)) & (np.linalg.norm(move, axis=1) > 1e-7)
+            length[uphill] /= 2
+        u[going] = at + length[:, None] * move
+        going = going[np.linalg.norm(move, axis=1) > 1e-15]
+        if not len(going):
             break
-        step = 1.0
-        while half(u + step * descent) > half(u) and step > 1e-3 and np.linalg.norm(descent) > 1e-7:
-            step /= 2
-        u = u + step * descent
-    return Projection(corners, *u, s)
+    return u
+
+
+def project(corners, s):
+    corners, s = np.asarray(corners, float), np.asarray(s, float)
+    return Projection(corners, *local_coordinates(corners[None], s[None])[0], s)
 
 
 def clamp(corners, projection):
