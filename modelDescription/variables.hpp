@@ -30,7 +30,14 @@ struct Block {
   std::size_t count() const { return numbers.size() * static_cast<std::size_t>(components); }
 };
 
-// Blocks in the order of their value references (from 0, without gaps).
+// Blocks in the order of their value references (from 0, without gaps), which is the order of Simulation::data().
 std::vector<Block> variables(const Model& model, const Layout& layout);
+
+// Name of variable `component` (from 0) of element `element`: "master[1].v[3]".
+std::string variableName(const Block& block, std::size_t element, int component);
+
+// Throws SceneError ("interface: expose: unknown name 'x'; known: ...") unless every name of settings.expose and
+// settings.hide is one of INTERFACE.
+void checkInterface(const Settings& settings);
 
 }  // namespace tiefmu

@@ -1,0 +1,94 @@
+// Which function may be called in which state: FMI 2.0, section 4.2.4 (state machine for co-simulation).
+#pragma once
+
+namespace tiefmu {
+
+enum State : unsigned {
+  instantiated = 1,
+  initializationMode = 2,
+  stepComplete = 4,
+  stepInProgress = 8,  // never entered: fmi2DoStep returns when the step is done
+  stepFailed = 16,     // never entered: no step is discarded
+  stepCanceled = 32,   // never entered
+  terminated = 64,
+  error = 128,
+  fatal = 256,         // never entered
+};
+
+constexpr const char* stateName(State state) {
+  switch (state) {
+    case instantiated: return "instantiated";
+    case initializationMode: return "initializationMode";
+    case stepComplete: return "stepComplete";
+    case stepInProgress: return "stepInProgress";
+    case stepFailed: return "stepFailed";
+    case stepCanceled: return "stepCanceled";
+    case terminated: return "terminated";
+    case error: return "error";
+    case fatal: return "fatal";
+  }
+  return "";
+}
+
+struct Call {
+  const char* name;
+  unsigned allowed;  // states
+};
+
+consteval unsigned row(const char* marks) {
+  unsigned states = 0, bit = 1;
+  for (; *marks; ++marks)
+    if (*marks != ' ') {
+      if (*marks == 'x') states |= bit;
+      bit <<= 1;
+    }
+  return bit == fatal << 1 ? states : throw "a row has one mark for each state";
+}
+
+// fmi2GetTypesPlatform, fmi2GetVersion, fmi2Instantiate and fmi2FreeInstance need no instance or end it, and are
+// always allowed.
+namespace call {
+// clang-format off
+//                                                                           instantiated
+//                                                                           | initializationMode
+//                                                                           | | stepComplete
+//                                                                           | | | stepInProgress
+//                                                                           | | | | stepFailed
+//                                                                           | | | | | stepCanceled
+//                                                                           | | | | | | terminated
+//                                                                           | | | | | | | error
+//                                                                           | | | | | | | | fatal
+constexpr Call setDebugLogging         {"fmi2SetDebugLogging",          row("x x x x x x x x .")};
+constexpr Call setupExperiment         {"fmi2SetupExperiment",          row("x . . . . . . . .")};
+constexpr Call enterInitializationMode {"fmi2EnterInitializationMode",  row("x . . . . . . . .")};
+constexpr Call exitInitializationMode  {"fmi2ExitInitializationMode",   row(". x . . . . . . .")};
+constexpr Call terminate               {"fmi2Terminate",                row(". . x . x . . . .")};
+constexpr Call reset                   {"fmi2Reset",                    row("x x x . x x x x .")};
+constexpr Call getReal                 {"fmi2GetReal",                  row(". x x . x x x x .")};
+constexpr Call getInteger              {"fmi2GetInteger",               row(". x x . x x x x .")};
+constexpr Call getBoolean              {"fmi2GetBoolean",               row(". x x . x x x x .")};
+constexpr Call getString               {"fmi2GetString",                row(". x x . x x x x .")};
+constexpr Call setReal                 {"fmi2SetReal",                  row("x x x . . . . . .")};
+constexpr Call setInteger              {"fmi2SetInteger",               row("x x x . . . . . .")};
+constexpr Call setBoolean              {"fmi2SetBoolean",               row("x x x . . . . . .")};
+constexpr Call setString               {"fmi2SetString",                row("x x x . . . . . .")};
+constexpr Call getFMUstate             {"fmi2GetFMUstate",              row("x x x . x x x x .")};
+constexpr Call setFMUstate             {"fmi2SetFMUstate",              row("x x x . x x x x .")};
+constexpr Call freeFMUstate            {"fmi2FreeFMUstate",             row("x x x . x x x x .")};
+constexpr Call serializedFMUstateSize  {"fmi2SerializedFMUstateSize",   row("x x x . x x x x .")};
+constexpr Call serializeFMUstate       {"fmi2SerializeFMUstate",        row("x x x . x x x x .")};
+constexpr Call deSerializeFMUstate     {"fmi2DeSerializeFMUstate",      row("x x x . x x x x .")};
+constexpr Call getDirectionalDerivative{"fmi2GetDirectionalDerivative", row(". x x . x x x x .")};
+constexpr Call setRealInputDerivatives {"fmi2SetRealInputDerivatives",  row("x x x . . . . . .")};
+constexpr Call getRealOutputDerivatives{"fmi2GetRealOutputDerivatives", row(". . x . x x x x .")};
+constexpr Call doStep                  {"fmi2DoStep",                   row(". . x . . . . . .")};
+constexpr Call cancelStep              {"fmi2CancelStep",               row(". . . x . . . . .")};
+constexpr Call getStatus               {"fmi2GetStatus",                row(". . x x x . x . .")};
+constexpr Call getRealStatus           {"fmi2GetRealStatus",            row(". . x x x . x . .")};
+constexpr Call getIntegerStatus        {"fmi2GetIntegerStatus",         row(". . x x x . x . .")};
+constexpr Call getBooleanStatus        {"fmi2GetBooleanStatus",         row(". . x x x . x . .")};
+constexpr Call getStringStatus         {"fmi2GetStringStatus",          row(". . x x x . x . .")};
+// clang-format on
+}  // namespace call
+
+}  // namespace tiefmu

@@ -1,0 +1,232 @@
+// The functions of FMI 2.0 co-simulation. Each goes through `guard`: no exception leaves the library.
+#include <cstdio>
+#include <exception>
+
+#include "instance.hpp"
+
+extern "C" {
+#include "fmi2Functions.h"
+}
+
+using namespace tiefmu;
+
+namespace {
+
+// Runs body(instance) where the call is allowed. What goes wrong is logged and returned as fmi2Error; unless the call
+// was merely refused, the instance is then in the state `error`, which only fmi2Reset and fmi2SetFMUstate leave.
+template <class Body>
+fmi2Status guard(fmi2Component component, const Call& call, Body body) noexcept {
+  auto* instance = static_cast<Instance*>(component);
+  if (!instance) return fmi2Error;
+  const auto fail = [&](const char* message, State next) {
+    char line[2000];  // no allocation: memory may be what is lacking
+    std::snprintf(line, sizeof line, "%s: %s", call.name, message);
+    instance->state = next;
+    instance->logger.write(fmi2Error, Category::error, line);
+    return fmi2Error;
+  };
+  try {
+    if (!(call.allowed & instance->state))
+      throw Refused(std::string("not allowed in state ") + stateName(instance->state));
+    body(*instance);
+    return fmi2OK;
+  } catch (const Refused& e) {
+    return fail(e.what(), instance->state);
+  } catch (const std::exception& e) {
+    return fail(e.what(), error);
+  } catch (...) {
+    return fail("unknown exception", error);
+  }
+}
+
+// For the variable types that no scene has: only an empty call is right.
+fmi2Status noVariables(fmi2Component c, const Call& call, size_t count) {
+  return guard(c, call, [&](Instance&) {
+    if (count > 0) throw Refused("all variables are of type Real");
+  });
+}
+
+fmi2Status notBuilt(fmi2Component c, const Call& call) {
+  return guard(c, call, [](Instance&) { throw Refused("not supported; see the capability flags"); });
+}
+
+}  // namespace
+
+extern "C" {
+
+const char* fmi2GetTypesPlatform() { return fmi2TypesPlatform; }
+
+const char* fmi2GetVersion() { return fmi2Version; }
+
+fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2String fmuGUID,
+                              fmi2String fmuResourceLocation, const fmi2CallbackFunctions* functions,
+                              fmi2Boolean /*visible*/, fmi2Boolean loggingOn) {
+  const auto fail = [&](const char* message) -> fmi2Component {
+    char line[2000];
+    std::snprintf(line, sizeof line, "fmi2Instantiate: %s", message);
+    if (functions && functions->logger)
+      functions->logger(functions->componentEnvironment, instanceName ? instanceName : "", fmi2Error, "logStatusError",
+                        "%s", line);
+    return nullptr;
+  };
+  try {
+    if (!functions) return fail("the callback functions are a null pointer");
+    if (!instanceName) return fail("the instance name is a null pointer");
+    if (!fmuGUID) return fail("the GUID is a null pointer");
+    if (!fmuResourceLocation) return fail("the resource location is a null pointer");
+    if (fmuType != fmi2CoSimulation) return fail("only co-simulation is supported");
+    Logger logger;
+    logger.callback = functions->logger;
+    logger.environment = functions->componentEnvironment;
+    logger.instanceName = instanceName;
+    logger.on = loggingOn;
+    return new Instance(std::move(logger), loadResource(fmuResourceLocation, fmuGUID).model);
+  } catch (const std::exception& e) {
+    return fail(e.what());
+  } catch (...) {
+    return fail("unknown exception");
+  }
+}
+
+void fmi2FreeInstance(fmi2Component c) { delete static_cast<Instance*>(c); }
+
+fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean loggingOn, size_t nCategories,
+                               const fmi2String categories[]) {
+  return guard(c, call::setDebugLogging, [&](Instance& i) { i.setDebugLogging(loggingOn, nCategories, categories); });
+}
+
+fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean /*toleranceDefined*/, fmi2Real /*tolerance*/,
+                               fmi2Real startTime, fmi2Boolean stopTimeDefined, fmi2Real stopTime) {
+  return guard(c, call::setupExperiment, [&](Instance& i) { i.setupExperiment(startTime, stopTimeDefined, stopTime); });
+}
+
+fmi2Status fmi2EnterInitializationMode(fmi2Component c) {
+  return guard(c, call::enterInitializationMode, [](Instance& i) { i.enterInitializationMode(); });
+}
+
+fmi2Status fmi2ExitInitializationMode(fmi2Component c) {
+  return guard(c, call::exitInitializationMode, [](Instance& i) { i.exitInitializationMode(); });
+}
+
+fmi2Status fmi2Terminate(fmi2Component c) {
+  return guard(c, call::terminate, [](Instance& i) { i.state = terminated; });
+}
+
+fmi2Status fmi2Reset(fmi2Component c) {
+  return guard(c, call::reset, [](Instance& i) { i.reset(); });
+}
+
+fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, fmi2Real value[]) {
+  return guard(c, call::getReal, [&](Instance& i) { i.get(vr, nvr, value); });
+}
+
+fmi2Status fmi2GetInteger(fmi2Component c, const fmi2ValueReference*, size_t nvr, fmi2Integer*) {
+  return noVariables(c, call::getInteger, nvr);
+}
+
+fmi2Status fmi2GetBoolean(fmi2Component c, const fmi2ValueReference*, size_t nvr, fmi2Boolean*) {
+  return noVariables(c, call::getBoolean, nvr);
+}
+
+fmi2Status fmi2GetString(fmi2Component c, const fmi2ValueReference*, size_t nvr, fmi2String*) {
+  return noVariables(c, call::getString, nvr);
+}
+
+fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2Real value[]) {
+  return guard(c, call::setReal, [&](Instance& i) { i.set(vr, nvr, value); });
+}
+
+fmi2Status fmi2SetInteger(fmi2Component c, const fmi2ValueReference*, size_t nvr, const fmi2Integer*) {
+  return noVariables(c, call::setInteger, nvr);
+}
+
+fmi2Status fmi2SetBoolean(fmi2Component c, const fmi2ValueReference*, size_t nvr, const fmi2Boolean*) {
+  return noVariables(c, call::setBoolean, nvr);
+}
+
+fmi2Status fmi2SetString(fmi2Component c, const fmi2ValueReference*, size_t nvr, const fmi2String*) {
+  return noVariables(c, call::setString, nvr);
+}
+
+fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate* state) {
+  return guard(c, call::getFMUstate, [&](Instance& i) { i.getState(state); });
+}
+
+fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate state) {
+  return guard(c, call::setFMUstate, [&](Instance& i) { i.setState(state); });
+}
+
+fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate* state) {
+  return guard(c, call::freeFMUstate, [&](Instance& i) { i.freeState(state); });
+}
+
+fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate, size_t*) {
+  return notBuilt(c, call::serializedFMUstateSize);
+}
+
+fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate, fmi2Byte*, size_t) {
+  return notBuilt(c, call::serializeFMUstate);
+}
+
+fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte*, size_t, fmi2FMUstate*) {
+  return notBuilt(c, call::deSerializeFMUstate);
+}
+
+fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReference*, size_t, const fmi2ValueReference*,
+                                        size_t, const fmi2Real*, fmi2Real*) {
+  return notBuilt(c, call::getDirectionalDerivative);
+}
+
+fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference*, size_t, const fmi2Integer*,
+                                       const fmi2Real*) {
+  return notBuilt(c, call::setRealInputDerivatives);
+}
+
+fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReference*, size_t, const fmi2Integer*,
+                                        fmi2Real*) {
+  return notBuilt(c, call::getRealOutputDerivatives);
+}
+
+fmi2Status fmi2DoStep(fmi2Component c, fmi2Real currentCommunicationPoint, fmi2Real communicationStepSize,
+                      fmi2Boolean /*noSetFMUStatePriorToCurrentPoint*/) {
+  return guard(c, call::doStep, [&](Instance& i) { i.doStep(currentCommunicationPoint, communicationStepSize); });
+}
+
+fmi2Status fmi2CancelStep(fmi2Component c) {
+  return guard(c, call::cancelStep, [](Instance&) {});  // never allowed: no step is ever in progress
+}
+
+// Of the kinds of status only these are known; the standard's answer to the others is fmi2Discard.
+
+fmi2Status fmi2GetStatus(fmi2Component c, const fmi2StatusKind, fmi2Status*) {
+  const fmi2Status status = guard(c, call::getStatus, [](Instance&) {});
+  return status == fmi2OK ? fmi2Discard : status;  // only of interest after fmi2Pending
+}
+
+fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Real* value) {
+  const fmi2Status status = guard(c, call::getRealStatus, [&](Instance& i) {
+    if (!value) throw Refused("the place for the value is a null pointer");
+    if (kind == fmi2LastSuccessfulTime) *value = i.time();
+  });
+  return status == fmi2OK && kind != fmi2LastSuccessfulTime ? fmi2Discard : status;
+}
+
+fmi2Status fmi2GetIntegerStatus(fmi2Component c, const fmi2StatusKind, fmi2Integer*) {
+  const fmi2Status status = guard(c, call::getIntegerStatus, [](Instance&) {});
+  return status == fmi2OK ? fmi2Discard : status;
+}
+
+fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Boolean* value) {
+  const fmi2Status status = guard(c, call::getBooleanStatus, [&](Instance&) {
+    if (!value) throw Refused("the place for the value is a null pointer");
+    if (kind == fmi2Terminated) *value = fmi2False;
+  });
+  return status == fmi2OK && kind != fmi2Terminated ? fmi2Discard : status;
+}
+
+fmi2Status fmi2GetStringStatus(fmi2Component c, const fmi2StatusKind, fmi2String*) {
+  const fmi2Status status = guard(c, call::getStringStatus, [](Instance&) {});
+  return status == fmi2OK ? fmi2Discard : status;
+}
+
+}  // extern "C"

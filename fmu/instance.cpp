@@ -1,0 +1,299 @@
+#include "instance.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <limits>
+
+#include "../modelDescription/xml.hpp"
+
+namespace tiefmu {
+namespace {
+
+int hexDigit(char c) {
+  if (c >= '0' && c <= '9') return c - '0';
+  if (c >= 'a' && c <= 'f') return c - 'a' + 10;
+  if (c >= 'A' && c <= 'F') return c - 'A' + 10;
+  return -1;
+}
+
+std::string percentDecoded(const std::string& text) {
+  std::string out;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const bool escape = text[i] == '%' && i + 2 < text.size() && hexDigit(text[i + 1]) >= 0 && hexDigit(text[i + 2]) >= 0;
+    if (!escape) {
+      out += text[i];
+    } else {
+      out += static_cast<char>(16 * hexDigit(text[i + 1]) + hexDigit(text[i + 2]));
+      i += 2;
+    }
+  }
+  return out;
+}
+
+// file:/path, file:///path, file://localhost/path, or a plain path.
+std::string folderOf(const std::string& location) {
+  if (location.compare(0, 5, "file:") != 0) {
+    if (location.find("://") != std::string::npos)
+      throw ResourceError("resource location '" + location + "': only file: locations can be read");
+    return location;
+  }
+  std::string path = location.substr(5);
+  if (path.compare(0, 2, "//") == 0) {
+    const std::size_t slash = path.find('/', 2);
+    const std::string host = path.substr(2, slash == std::string::npos ? slash : slash - 2);
+    if (!host.empty() && host != "localhost")
+      throw ResourceError("resource location '" + location + "': on another computer, '" + host + "'");
+    path = slash == std::string::npos ? "" : path.substr(slash);
+  }
+  path = percentDecoded(path);
+#ifdef _WIN32
+  if (path.size() > 2 && path[0] == '/' && path[2] == ':') path.erase(0, 1);  // /C:/folder
+#endif
+  return path;
+}
+
+bool allFinite(const double* values, std::size_t count) {
+  bool finite = true;
+  for (std::size_t i = 0; i < count; ++i) finite &= std::abs(values[i]) <= std::numeric_limits<double>::max();
+  return finite;
+}
+
+std::string text(double number) {
+  char buffer[32];
+  std::snprintf(buffer, sizeof buffer, "%.9g", number);
+  return buffer;
+}
+
+// Communication points are sums of steps that the master may round in another order than we do; but a missed or
+// repeated step is always seen.
+double tolerance(double time, double step) { return 1e-12 * std::abs(time) + 1e-3 * step; }
+
+}  // namespace
+
+std::string resourcePath(const std::string& location, const char* file) {
+  return (std::filesystem::path(folderOf(location)) / file).string();
+}
+
+Resource loadResource(const std::string& location, const std::string& guid) {
+  const std::string path = resourcePath(location, "scene.bin");
+  std::ifstream stream(path, std::ios::binary);
+  if (!stream) throw ResourceError("cannot read '" + path + "'");
+  const std::string bytes{std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
+  Resource resource;
+  try {
+    resource = readResource(bytes);
+  } catch (const ResourceError& e) {
+    throw ResourceError("'" + path + "': " + e.what());
+  }
+  if (resource.guid != guid)
+    throw ResourceError("'" + path + "' has GUID '" + resource.guid + "', the caller expects '" + guid + "'");
+  return resource;
+}
+
+bool Logger::wants(Category category) const { return callback && on && categories >> static_cast<int>(category) & 1; }
+
+void Logger::write(fmi2Status status, Category category, const char* message) const noexcept {
+  const bool urgent = status == fmi2Error || status == fmi2Fatal;
+  if (!callback || !(urgent || wants(category))) return;
+  // The callback takes a printf format; a message may hold any character.
+  callback(environment, instanceName.c_str(), status, logCategories[static_cast<int>(category)].name, "%s", message);
+}
+
+Instance::Instance(Logger instanceLogger, Model model)
+    : logger(std::move(instanceLogger)), simulation(std::make_shared<const Model>(std::move(model))) {
+  for (const Block& b : variables(simulation.model(), simulation.layout())) {
+    references = b.reference + static_cast<std::uint32_t>(b.count());
+    const bool continues = !ranges.empty() && ranges.back().causality == b.causality &&
+                           ranges.back().place + (ranges.back().end - ranges.back().first) == b.place;
+    if (continues)
+      ranges.back().end = references;
+    else
+      ranges.push_back({b.reference, references, b.causality, b.place});
+  }
+  std::uint32_t range = 0;
+  for (std::uint32_t r = 0; r < references; r += 64) {
+    while (r >= ranges[range].end) ++range;
+    firstRange.push_back(range);
+  }
+}
+
+void Instance::setDebugLogging(bool on, std::size_t count, const fmi2String categories[]) {
+  unsigned chosen = count == 0 ? ~0u : 0u;
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::string name = categories && categories[i] ? categories[i] : "";
+    const auto* found = std::find_if(std::begin(logCategories), std::end(logCategories),
+                                     [&](const LogCategory& c) { return name == c.name; });
+    if (found == std::end(logCategories)) throw Refused("unknown log category '" + name + "'");
+    const auto category = static_cast<Category>(found - std::begin(logCategories));
+    chosen |= category == Category::all ? ~0u : 1u << static_cast<int>(category);
+  }
+  logger.on = on;
+  logger.categories = chosen;
+}
+
+void Instance::setupExperiment(double startTime, bool stopTimeDefined, double stopTime) {
+  if (!std::isfinite(startTime)) throw Refused("the start time is not a finite number");
+  if (stopTimeDefined && !(stopTime >= startTime)) throw Refused("the stop time is not after the start time");
+  clock = {startTime, stopTime, stopTimeDefined};
+}
+
+void Instance::enterInitializationMode() {
+  if (logger.wants(Category::tie))
+    for (const Finding& f : simulation.model().findings)
+      logger.write(f.kind == Finding::warning ? fmi2Warning : fmi2OK, Category::tie, f.text.c_str());
+  state = initializationMode;
+}
+
+void Instance::exitInitializationMode() {
+  if (parametersSet || inputsSet) simulation.initialise(clock.time);
+  parametersSet = inputsSet = false;
+  if (simulation.model().anyFree() && logger.wants(Category::stability)) {
+    const std::string message = "stable time step " + text(*simulation.field(Field::stableTimeStep)) +
+                                " s, nodal time step " + text(*simulation.field(Field::nodalTimeStep)) +
+                                " s, limit of the integrator " + text(simulation.integratorLimit()) + " s";
+    logger.write(fmi2OK, Category::stability, message.c_str());
+  }
+  state = stepComplete;
+}
+
+void Instance::reset() {
+  simulation.reset();
+  clock = {};
+  parametersSet = inputsSet = true;
+  state = instantiated;
+}
+
+const Instance::Range& Instance::rangeOf(std::uint32_t reference) const {
+  if (reference >= references)
+    throw Refused("unknown value reference " + std::to_string(reference) + "; there are " + std::to_string(references));
+  const Range* range = &ranges[firstRange[reference / 64]];
+  while (reference >= range->end) ++range;
+  return *range;
+}
+
+std::string Instance::nameOf(std::uint32_t reference) const {
+  for (const Block& b : variables(simulation.model(), simulation.layout()))
+    if (reference - b.reference < b.count()) {
+      const std::uint32_t offset = reference - b.reference, components = static_cast<std::uint32_t>(b.components);
+      return variableName(b, offset / components, static_cast<int>(offset % components));
+    }
+  return {};
+}
+
+template <class Use>
+void Instance::forRuns(const fmi2ValueReference refs[], std::size_t count, Use use) const {
+  if (count > 0 && !refs) throw Refused("the array of value references is a null pointer");
+  for (std::size_t i = 0; i < count;) {
+    const std::uint32_t first = refs[i];
+    const Range& range = rangeOf(first);
+    const std::size_t most = std::min<std::size_t>(count - i, range.end - first);
+    std::size_t run = 1;
+    while (run < most && refs[i + run] == first + run) ++run;
+    use(range, first, run, i);
+    i += run;
+  }
+}
+
+void Instance::get(const fmi2ValueReference refs[], std::size_t count, double values[]) {
+  if (count > 0 && !values) throw Refused("the array of values is a null pointer");
+  if (state == initializationMode && parametersSet) {
+    simulation.initialise(clock.time);
+    parametersSet = inputsSet = false;
+  }
+  if (state == initializationMode || state == stepComplete) simulation.updateOutputs();
+  const double* data = simulation.data();
+  forRuns(refs, count, [&](const Range& range, std::uint32_t first, std::size_t run, std::size_t i) {
+    std::memcpy(values + i, data + range.place + (first - range.first), run * sizeof(double));
+  });
+}
+
+void Instance::checkSettable(const Range& range, std::uint32_t reference) const {
+  if (range.causality == Causality::input) return;
+  if (range.causality == Causality::parameter && state != stepComplete) return;
+  const char* why = range.causality == Causality::parameter             ? "is fixed after the initialisation"
+                    : range.causality == Causality::calculatedParameter ? "is calculated"
+                                                                        : "is an output";
+  throw Refused("variable '" + nameOf(reference) + "' " + why + " and cannot be set");
+}
+
+void Instance::set(const fmi2ValueReference refs[], std::size_t count, const double values[]) {
+  if (count > 0 && !values) throw Refused("the array of values is a null pointer");
+  bool parameters = false, inputs = false;
+  // First all checks: a refused call changes nothing.
+  forRuns(refs, count, [&](const Range& range, std::uint32_t first, std::size_t run, std::size_t i) {
+    checkSettable(range, first);
+    (range.causality == Causality::parameter ? parameters : inputs) = true;
+    if (allFinite(values + i, run)) return;
+    std::size_t bad = 0;
+    while (std::isfinite(values[i + bad])) ++bad;
+    throw Refused("variable '" + nameOf(first + static_cast<std::uint32_t>(bad)) + "' cannot be set to " +
+                  (std::isnan(values[i + bad]) ? "NaN" : "an infinite value"));
+  });
+  double* data = simulation.data();
+  forRuns(refs, count, [&](const Range& range, std::uint32_t first, std::size_t run, std::size_t i) {
+    std::memcpy(data + range.place + (first - range.first), values + i, run * sizeof(double));
+  });
+  if (parameters) {
+    simulation.parametersChanged();
+    parametersSet = true;
+  }
+  if (inputs) {
+    simulation.inputsChanged();
+    inputsSet = true;
+  }
+}
+
+void Instance::doStep(double point, double step) {
+  if (!(step > 0) || !std::isfinite(step)) throw Refused("the step size " + text(step) + " s is not above zero and finite");
+  const double allowed = tolerance(clock.time, step);
+  if (!(std::abs(point - clock.time) <= allowed))
+    throw Refused("the step starts at " + text(point) + " s, but the instance stands at " + text(clock.time) + " s");
+  if (clock.stopDefined && point + step > clock.stop + allowed)
+    throw Refused("the step ends at " + text(point + step) + " s, after the stop time " + text(clock.stop) + " s");
+  simulation.step(step);
+  clock.time = point + step;  // the master's sum, so that rounding does not pull the two apart
+}
+
+Instance::SavedState& Instance::known(fmi2FMUstate saved) const {
+  const auto found = savedStates.find(saved);
+  if (found == savedStates.end()) throw Refused("this is no state that the instance has saved");
+  return *found->second;
+}
+
+void Instance::getState(fmi2FMUstate* saved) {
+  if (!saved) throw Refused("the place for the state is a null pointer");
+  if (!*saved) {
+    auto fresh = std::make_unique<SavedState>();
+    const fmi2FMUstate handle = fresh.get();
+    savedStates.emplace(handle, std::move(fresh));
+    *saved = handle;
+  }
+  SavedState& s = known(*saved);
+  simulation.save(s.simulation);
+  s.state = state;
+  s.clock = clock;
+  s.parametersSet = parametersSet;
+  s.inputsSet = inputsSet;
+}
+
+void Instance::setState(fmi2FMUstate saved) {
+  const SavedState& s = known(saved);
+  simulation.restore(s.simulation);
+  state = s.state;
+  clock = s.clock;
+  parametersSet = s.parametersSet;
+  inputsSet = s.inputsSet;
+}
+
+void Instance::freeState(fmi2FMUstate* saved) {
+  if (!saved || !*saved) return;
+  known(*saved);
+  savedStates.erase(*saved);
+  *saved = nullptr;
+}
+
+}  // namespace tiefmu

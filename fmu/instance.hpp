@@ -1,0 +1,105 @@
+// One FMU instance: a simulation, where its variables stand, its state, and its logger.
+#pragma once
+
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <unordered_map>
+#include <vector>
+
+#include "../modelDescription/resource.hpp"
+#include "../modelDescription/variables.hpp"
+#include "calls.hpp"
+
+extern "C" {
+#include "fmi2FunctionTypes.h"
+}
+
+namespace tiefmu {
+
+// A call that is refused: the instance is as before. Every other exception puts it into the state `error`.
+struct Refused : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+// Indexes of logCategories.
+enum class Category { error, warning, tie, stability, all };
+
+// Copied from the caller's callbacks; the environment goes back to it with every message.
+struct Logger {
+  fmi2CallbackLogger callback = nullptr;
+  fmi2ComponentEnvironment environment = nullptr;
+  std::string instanceName;
+  bool on = false;
+  unsigned categories = ~0u;  // bit i: category i
+
+  bool wants(Category category) const;
+  // Errors are logged always. Does not throw.
+  void write(fmi2Status status, Category category, const char* message) const noexcept;
+};
+
+// Path of a file in the resource folder, from its location as fmi2Instantiate gets it: a file URI or a plain path.
+std::string resourcePath(const std::string& location, const char* file);
+
+// Throws ResourceError (also when the file cannot be read, or belongs to another GUID).
+Resource loadResource(const std::string& location, const std::string& guid);
+
+class Instance {
+ public:
+  Instance(Logger instanceLogger, Model model);
+
+  State state = instantiated;
+  Logger logger;
+
+  void setDebugLogging(bool on, std::size_t count, const fmi2String categories[]);
+  void setupExperiment(double startTime, bool stopTimeDefined, double stopTime);
+  void enterInitializationMode();
+  void exitInitializationMode();
+  void reset();
+  void get(const fmi2ValueReference references[], std::size_t count, double values[]);
+  void set(const fmi2ValueReference references[], std::size_t count, const double values[]);
+  void doStep(double currentCommunicationPoint, double communicationStepSize);
+  double time() const { return clock.time; }
+
+  void getState(fmi2FMUstate* saved);
+  void setState(fmi2FMUstate saved);
+  void freeState(fmi2FMUstate* saved);
+
+ private:
+  // References [first, end) stand at places [place, ...) of the simulation's array.
+  struct Range {
+    std::uint32_t first, end;
+    Causality causality;
+    std::size_t place;
+  };
+
+  struct Clock {
+    double time = 0, stop = 0;
+    bool stopDefined = false;
+  };
+
+  struct SavedState {
+    Simulation::State simulation;
+    State state;
+    Clock clock;
+    bool parametersSet, inputsSet;
+  };
+
+  const Range& rangeOf(std::uint32_t reference) const;
+  void checkSettable(const Range& range, std::uint32_t reference) const;
+  std::string nameOf(std::uint32_t reference) const;
+  SavedState& known(fmi2FMUstate saved) const;
+  // Calls use(range, first reference, number, index of the first) for each run of consecutive references.
+  template <class Use>
+  void forRuns(const fmi2ValueReference references[], std::size_t count, Use use) const;
+
+  Simulation simulation;
+  std::vector<Range> ranges;
+  std::vector<std::uint32_t> firstRange;  // range of every 64th reference
+  std::uint32_t references = 0;
+  Clock clock;
+  bool parametersSet = true, inputsSet = true;  // since the simulation was last initialised
+  std::unordered_map<fmi2FMUstate, std::unique_ptr<SavedState>> savedStates;
+};
+
+}  // namespace tiefmu

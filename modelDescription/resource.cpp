@@ -1,0 +1,372 @@
+#include "resource.hpp"
+
+#include <cereal/archives/portable_binary.hpp>
+#include <sstream>
+#include <streambuf>
+#include <type_traits>
+
+namespace tiefmu {
+namespace {
+
+constexpr std::string_view magic = "tiefmu scene\n";
+constexpr std::uint32_t formatVersion = 1;  // raise it whenever `fields` changes
+constexpr std::size_t headerSize = magic.size() + 4 + 8 + 8;
+
+// FNV-1a, 64 bit: against damage in transport, not against intent.
+std::uint64_t checksum(std::string_view bytes) {
+  std::uint64_t hash = 14695981039346656037u;
+  for (unsigned char c : bytes) hash = (hash ^ c) * 1099511628211u;
+  return hash;
+}
+
+void putNumber(std::string& out, std::uint64_t value, int bytes) {
+  for (int i = 0; i < bytes; ++i) out += static_cast<char>(value >> (8 * i) & 255);
+}
+
+std::uint64_t takeNumber(std::string_view& in, int bytes) {
+  std::uint64_t value = 0;
+  for (int i = 0; i < bytes; ++i) value |= static_cast<std::uint64_t>(static_cast<unsigned char>(in[i])) << (8 * i);
+  in.remove_prefix(bytes);
+  return value;
+}
+
+class Writer {
+ public:
+  explicit Writer(std::ostream& stream)
+      : archive(stream, cereal::PortableBinaryOutputArchive::Options::LittleEndian()) {}
+  template <class T>
+  void number(const T& value) {
+    archive(value);
+  }
+  template <class T>
+  void numbers(const T* values, std::size_t count) {
+    archive(cereal::binary_data(values, count * sizeof(T)));
+  }
+  std::size_t size(std::size_t count) {
+    archive(static_cast<std::uint64_t>(count));
+    return count;
+  }
+
+ private:
+  cereal::PortableBinaryOutputArchive archive;
+};
+
+struct View : std::streambuf {
+  explicit View(std::string_view bytes) {
+    char* begin = const_cast<char*>(bytes.data());
+    setg(begin, begin, begin + bytes.size());
+  }
+  std::size_t left() const { return static_cast<std::size_t>(egptr() - gptr()); }
+};
+
+class Reader {
+ public:
+  explicit Reader(std::string_view bytes) : view(bytes), stream(&view), archive(stream) {}
+  template <class T>
+  void number(T& value) {
+    archive(value);
+  }
+  template <class T>
+  void numbers(T* values, std::size_t count) {
+    archive(cereal::binary_data(values, count * sizeof(T)));
+  }
+  // Count of elements of at least `bytesEach`; refused before anything is allocated for it.
+  std::size_t size(std::size_t, std::size_t bytesEach) {
+    std::uint64_t count = 0;
+    archive(count);
+    if (count > view.left() / bytesEach) throw ResourceError("scene: an array is longer than the file");
+    return static_cast<std::size_t>(count);
+  }
+  bool atEnd() const { return view.left() == 0; }
+
+ private:
+  View view;
+  std::istream stream;
+  cereal::PortableBinaryInputArchive archive;
+};
+
+// `field` and `fields` list what is stored, once for both directions: with a Writer the values are only read.
+
+template <class Archive, class T>
+  requires std::is_arithmetic_v<T>
+void field(Archive& a, T& value) {
+  a.number(value);
+}
+
+template <class Archive, class E>
+  requires std::is_enum_v<E>
+void field(Archive& a, E& value) {
+  auto number = static_cast<std::underlying_type_t<E>>(value);
+  a.number(number);
+  value = static_cast<E>(number);  // its range is checked by checkModel
+}
+
+template <class Archive>
+void field(Archive& a, Vec3& value) {
+  a.numbers(value.data(), 3);
+}
+
+template <class Archive>
+std::size_t length(Archive& a, std::size_t count, std::size_t bytesEach) {
+  if constexpr (std::is_same_v<Archive, Reader>)
+    return a.size(count, bytesEach);
+  else
+    return a.size(count);
+}
+
+template <class Archive>
+void field(Archive& a, std::string& text) {
+  text.resize(length(a, text.size(), 1));
+  a.numbers(text.data(), text.size());
+}
+
+template <class Archive>
+void field(Archive& a, SpringEnd& end) {
+  field(a, end.node);
+  field(a, end.slave);
+  field(a, end.orientation);
+}
+
+template <class Archive>
+void field(Archive& a, Spring& s) {
+  field(a, s.a);
+  field(a, s.b);
+  field(a, s.kind);
+  for (Vec3* v : {&s.stiffness, &s.damping, &s.rotationalStiffness, &s.rotationalDamping, &s.arm, &s.anchor})
+    field(a, *v);
+  field(a, s.length);
+}
+
+template <class Archive>
+void field(Archive& a, TieGroup& g);
+
+template <class Archive>
+void field(Archive& a, Finding& f) {
+  int kind = f.kind;
+  field(a, kind);
+  f.kind = kind == Finding::warning ? Finding::warning : Finding::note;
+  field(a, f.text);
+}
+
+template <class Archive, class T>
+void field(Archive& a, std::vector<T>& values) {
+  if constexpr (std::is_arithmetic_v<T>) {
+    values.resize(length(a, values.size(), sizeof(T)));
+    a.numbers(values.data(), values.size());
+  } else {
+    values.resize(length(a, values.size(), 8));  // every structure is at least a length or two integers
+    for (T& value : values) field(a, value);
+  }
+}
+
+template <class Archive>
+void field(Archive& a, TieGroup& g) {
+  field(a, g.coupling);
+  field(a, g.corners);
+  field(a, g.firstSlave);
+  field(a, g.node);
+  field(a, g.begin);
+  field(a, g.weight);
+  field(a, g.clamped);
+}
+
+template <class Archive>
+void field(Archive& a, Settings& s) {
+  field(a, s.inertia);
+  field(a, s.reaction);
+  field(a, s.geometry);
+  field(a, s.position);
+  field(a, s.gravity);
+  field(a, s.method);
+  field(a, s.timeStep);
+  field(a, s.safety);
+  field(a, s.expose);
+  field(a, s.hide);
+}
+
+// Everything of a model but its tie report: an instance computes with all of it and shows none of that.
+template <class Archive>
+void field(Archive& a, Model& m) {
+  field(a, m.settings);
+  for (int& begin : m.begin) field(a, begin);
+  field(a, m.nodeId);
+  field(a, m.nodeNumber);
+  for (auto* v : {&m.nodePosition, &m.nodeVelocity, &m.nodeSpin, &m.nodeMass, &m.nodeInertia, &m.nodeStiffness,
+                  &m.nodeRotationalStiffness})
+    field(a, *v);
+  field(a, m.slaveId);
+  field(a, m.slaveNumber);
+  for (auto* v : {&m.slavePosition, &m.slaveOffset, &m.slaveMass, &m.slaveInertia, &m.slaveStiffness,
+                  &m.slaveRotationalStiffness})
+    field(a, *v);
+  field(a, m.turningSlaves);
+  field(a, m.groups);
+  field(a, m.springs);
+  field(a, m.oriented);
+  field(a, m.tieName);
+  field(a, m.findings);
+}
+
+void require(bool truth, const char* what) {
+  if (!truth) throw ResourceError(std::string("scene: the model contradicts itself: ") + what);
+}
+
+template <class T>
+void requireSize(const std::vector<T>& values, std::size_t count, const char* what) {
+  require(values.size() == count, what);
+}
+
+void requireFinite(const std::vector<double>& values, const char* what) {
+  for (double v : values) require(std::isfinite(v), what);
+}
+
+template <class E>
+void requireEnum(E value, E last, const char* what) {
+  require(static_cast<int>(value) <= static_cast<int>(last), what);
+}
+
+void checkSettings(const Settings& s) {
+  requireEnum(s.inertia, Inertia::consistent, "inertia");
+  requireEnum(s.reaction, Reaction::split, "reaction");
+  requireEnum(s.geometry, Geometry::small, "geometry");
+  requireEnum(s.position, Position::input, "position");
+  requireEnum(s.method, Method::rk4, "method");
+  require(s.gravity.allFinite() && std::isfinite(s.timeStep) && std::isfinite(s.safety), "settings");
+}
+
+void checkNodes(const Model& m) {
+  require(m.begin[0] == 0, "node groups");
+  for (int g = 0; g < nodeGroups; ++g) require(m.begin[g] <= m.begin[g + 1], "node groups");
+  const auto nodes = static_cast<std::size_t>(m.nodes()), rotating = static_cast<std::size_t>(m.rotating());
+  requireSize(m.nodeId, nodes, "node ids");
+  requireSize(m.nodeNumber, nodes, "node numbers");
+  requireSize(m.nodePosition, 3 * nodes, "node positions");
+  requireSize(m.nodeVelocity, 3 * nodes, "node velocities");
+  requireSize(m.nodeSpin, 3 * rotating, "node spins");
+  requireSize(m.nodeMass, nodes, "node masses");
+  requireSize(m.nodeInertia, nodes, "node inertias");
+  requireSize(m.nodeStiffness, nodes, "node stiffnesses");
+  requireSize(m.nodeRotationalStiffness, nodes, "rotational node stiffnesses");
+  for (const auto* v : {&m.nodePosition, &m.nodeVelocity, &m.nodeSpin, &m.nodeMass, &m.nodeInertia, &m.nodeStiffness,
+                        &m.nodeRotationalStiffness})
+    requireFinite(*v, "node numbers that are not finite");
+  for (int number : m.nodeNumber) require(number >= 1, "node numbers");
+}
+
+void checkSlaves(const Model& m) {
+  const std::size_t slaves = m.slaveId.size();
+  require(slaves < (std::size_t{1} << 31), "number of slaves");
+  require(m.turningSlaves >= 0 && static_cast<std::size_t>(m.turningSlaves) <= slaves, "turning slaves");
+  requireSize(m.slaveNumber, slaves, "slave numbers");
+  requireSize(m.slavePosition, 3 * slaves, "slave positions");
+  requireSize(m.slaveOffset, 3 * slaves, "slave offsets");
+  requireSize(m.slaveMass, slaves, "slave masses");
+  requireSize(m.slaveInertia, slaves, "slave inertias");
+  requireSize(m.slaveStiffness, slaves, "slave stiffnesses");
+  requireSize(m.slaveRotationalStiffness, slaves, "rotational slave stiffnesses");
+  for (const auto* v : {&m.slavePosition, &m.slaveOffset, &m.slaveMass, &m.slaveInertia, &m.slaveStiffness,
+                        &m.slaveRotationalStiffness})
+    requireFinite(*v, "slave numbers that are not finite");
+  for (int number : m.slaveNumber) require(number >= 1, "slave numbers");
+}
+
+void checkGroups(const Model& m) {
+  std::size_t next = 0;
+  for (const TieGroup& g : m.groups) {
+    requireEnum(g.coupling, Coupling::translation, "coupling");
+    require(g.corners == 3 || g.corners == 4, "corners of a segment");
+    require(g.firstSlave >= 0 && static_cast<std::size_t>(g.firstSlave) == next, "slave groups");
+    require(!g.begin.empty() && g.begin.front() == 0, "segments");
+    for (std::size_t e = 1; e < g.begin.size(); ++e) require(g.begin[e - 1] <= g.begin[e], "segments");
+    const std::size_t corners = g.corners, segments = g.begin.size() - 1, slaves = g.begin.back();
+    requireSize(g.node, corners * segments, "corners of segments");
+    requireSize(g.weight, corners * slaves, "weights");
+    requireSize(g.clamped, corners * slaves, "clamped weights");
+    requireFinite(g.weight, "weights that are not finite");
+    requireFinite(g.clamped, "weights that are not finite");
+    const int nodes = g.coupling == Coupling::rotation ? m.rotating() : m.nodes();
+    for (int node : g.node) require(node >= 0 && node < nodes, "corners of segments");
+    next += slaves;
+    const bool turns = g.coupling != Coupling::translation;
+    require(slaves == 0 || turns == (next <= static_cast<std::size_t>(m.turningSlaves)), "turning slaves");
+  }
+  require(next == m.slaveId.size(), "slave groups");
+}
+
+void checkSprings(const Model& m) {
+  std::size_t rotations = m.oriented.size();  // quaternions: of meanMotion segments, then of `oriented`
+  for (const TieGroup& g : m.groups)
+    if (g.coupling == Coupling::meanMotion) rotations += g.begin.size() - 1;
+  const auto checkEnd = [&](const SpringEnd& e) {
+    require(e.node >= -1 && e.node < m.nodes() && e.slave >= -1 && e.slave < m.slaves(), "ends of springs");
+    require(e.node < 0 || e.slave < 0, "ends of springs");
+    require(e.orientation >= -1 && e.orientation < static_cast<int>(rotations), "ends of springs");
+  };
+  for (const Spring& s : m.springs) {
+    checkEnd(s.a);
+    checkEnd(s.b);
+    requireEnum(s.kind, SpringKind::bushing, "kind of spring");
+    for (const Vec3* v : {&s.stiffness, &s.damping, &s.rotationalStiffness, &s.rotationalDamping, &s.arm, &s.anchor})
+      require(v->allFinite(), "springs");
+    require(std::isfinite(s.length), "springs");
+  }
+  for (const SpringEnd& e : m.oriented) {
+    checkEnd(e);
+    require(e.node < m.rotating() && e.slave < m.turning(), "ends of springs");
+  }
+}
+
+}  // namespace
+
+void checkModel(const Model& model) {
+  checkSettings(model.settings);
+  checkNodes(model);
+  checkSlaves(model);
+  checkGroups(model);
+  checkSprings(model);
+}
+
+std::string writeResource(const Model& model, const std::string& guid) {
+  std::ostringstream stream;
+  Resource copy{model, guid};  // `field` takes no constants, because it also reads
+  {
+    Writer writer(stream);
+    field(writer, copy.guid);
+    field(writer, copy.model);
+  }
+  const std::string body = std::move(stream).str();
+  std::string out;
+  out.reserve(headerSize + body.size());
+  out += magic;
+  putNumber(out, formatVersion, 4);
+  putNumber(out, body.size(), 8);
+  putNumber(out, checksum(body), 8);
+  return out += body;
+}
+
+Resource readResource(std::string_view bytes) {
+  if (bytes.substr(0, magic.size()) != magic) throw ResourceError("scene: not a scene of tiefmu");
+  if (bytes.size() < headerSize) throw ResourceError("scene: cut short");
+  bytes.remove_prefix(magic.size());
+  const auto version = takeNumber(bytes, 4);
+  if (version != formatVersion)
+    throw ResourceError("scene: format version " + std::to_string(version) + ", this program reads version " +
+                        std::to_string(formatVersion));
+  const auto size = takeNumber(bytes, 8), sum = takeNumber(bytes, 8);
+  if (size != bytes.size())
+    throw ResourceError("scene: " + std::to_string(bytes.size()) + " bytes instead of " + std::to_string(size));
+  if (sum != checksum(bytes)) throw ResourceError("scene: damaged (checksum)");
+  try {
+    Reader reader(bytes);
+    Resource resource;
+    field(reader, resource.guid);
+    field(reader, resource.model);
+    if (!reader.atEnd()) throw ResourceError("scene: bytes left over");
+    checkModel(resource.model);
+    return resource;
+  } catch (const cereal::Exception&) {
+    throw ResourceError("scene: cut short");
+  }
+}
+
+}  // namespace tiefmu

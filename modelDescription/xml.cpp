@@ -1,0 +1,331 @@
+#include "xml.hpp"
+
+#include <algorithm>
+#include <charconv>
+#include <memory>
+#include <string_view>
+
+#include "dependencies.hpp"
+#include "variables.hpp"
+
+namespace tiefmu {
+namespace {
+
+struct UnitRow {
+  const char* name;
+  const char* base;      // attributes of BaseUnit
+  const char* quantity;  // name of the type that has this unit
+};
+
+// Every unit of the table of variables. A unit belongs to one quantity.
+constexpr UnitRow units[] = {
+    {"1", "", "Ratio"},
+    {"m", R"( m="1")", "Length"},
+    {"m/s", R"( m="1" s="-1")", "Velocity"},
+    {"m/s2", R"( m="1" s="-2")", "Acceleration"},
+    {"rad/s", R"( s="-1" rad="1")", "AngularVelocity"},
+    {"rad/s2", R"( s="-2" rad="1")", "AngularAcceleration"},
+    {"s", R"( s="1")", "Time"},
+    {"kg", R"( kg="1")", "Mass"},
+    {"kg.m2", R"( kg="1" m="2")", "MomentOfInertia"},
+    {"N", R"( kg="1" m="1" s="-2")", "Force"},
+    {"N.m", R"( kg="1" m="2" s="-2")", "Moment"},
+    {"N/m", R"( kg="1" s="-2")", "Stiffness"},
+    {"N.m/rad", R"( kg="1" m="2" s="-2" rad="-1")", "RotationalStiffness"},
+    {"J", R"( kg="1" m="2" s="-2")", "Energy"},
+    {"W", R"( kg="1" m="2" s="-3")", "Power"},
+};
+
+// The common validator takes 2 ms for each structured name.
+constexpr std::size_t mostStructuredNames = 10000;
+
+// Integers, and doubles as the shortest text that reads back to the same double.
+template <class Number>
+void appendNumber(std::string& out, Number number) {
+  char text[32];
+  out.append(text, std::to_chars(text, text + sizeof text, number).ptr);
+}
+
+// Text as an attribute value. XML 1.0 knows no control characters but tab and line ends, and those become blanks in
+// an attribute anyway.
+void appendEscaped(std::string& out, std::string_view text) {
+  for (char c : text) switch (c) {
+      case '&': out += "&amp;"; break;
+      case '<': out += "&lt;"; break;
+      case '>': out += "&gt;"; break;
+      case '"': out += "&quot;"; break;
+      default: out += static_cast<unsigned char>(c) < 0x20 || c == 0x7f ? ' ' : c;
+    }
+}
+
+void attribute(std::string& out, std::string_view name, std::string_view value) {
+  out += ' ';
+  out += name;
+  out += "=\"";
+  appendEscaped(out, value);
+  out += '"';
+}
+
+double fromText(const std::string& text) {
+  double value = 0;
+  std::from_chars(text.data(), text.data() + text.size(), value);
+  return value;
+}
+
+struct Experiment {
+  double step, stop;
+};
+
+// A thousand steps: of 1 ms, or where the step has a limit, of one substep rounded down to 1, 2 or 5 times a power of
+// ten.
+Experiment defaultExperiment(const Model& model, const Simulation& simulation) {
+  double substep = model.settings.timeStep > 0 ? model.settings.timeStep
+                                               : model.settings.safety * simulation.integratorLimit();
+  if (!model.anyFree() || substep > 1e6) substep = 1e-3;
+  char text[32];  // like 9.87e-07; its decimals are exact where those of log10 and pow are not
+  const char* end = std::to_chars(text, text + sizeof text, substep, std::chars_format::scientific).ptr;
+  const char* e = std::find(static_cast<const char*>(text), end, 'e') + 1;
+  int exponent = 0;
+  std::from_chars(*e == '+' ? e + 1 : e, end, exponent);
+  const char* digit = text[0] >= '5' ? "5e" : text[0] >= '2' ? "2e" : "1e";
+  return {fromText(digit + std::to_string(exponent)), fromText(digit + std::to_string(exponent + 3))};
+}
+
+struct Place {  // of an element in the listing
+  int prefix, number;
+  std::uint32_t block, element;
+};
+
+// Elements as a person reads them: first what belongs to no node, then masters, slaves, points by number.
+std::vector<Place> listing(const std::vector<Block>& blocks) {
+  std::vector<Place> places;
+  for (std::uint32_t b = 0; b < blocks.size(); ++b) {
+    const std::string& prefix = blocks[b].prefix;
+    const int order = prefix.empty() ? 0 : prefix == "master" ? 1 : prefix == "slave" ? 2 : 3;
+    for (std::uint32_t e = 0; e < blocks[b].numbers.size(); ++e)
+      places.push_back({order, blocks[b].numbers[e], b, e});
+  }
+  // Inputs and outputs stand before parameters, and otherwise in the order of memory.
+  const auto rank = [&](const Place& p) {
+    const Causality c = blocks[p.block].causality;
+    return c == Causality::input ? 0 : c == Causality::output ? 1 : 2;
+  };
+  std::sort(places.begin(), places.end(), [&](const Place& a, const Place& b) {
+    if (a.prefix != b.prefix) return a.prefix < b.prefix;
+    if (a.number != b.number) return a.number < b.number;
+    if (a.block == b.block) return a.element < b.element;
+    const int ra = rank(a), rb = rank(b);
+    return ra != rb ? ra < rb : a.block < b.block;
+  });
+  return places;
+}
+
+const char* causalityAttributes(Causality causality) {
+  switch (causality) {
+    case Causality::parameter: return R"( causality="parameter" variability="fixed")";
+    case Causality::calculatedParameter: return R"( causality="calculatedParameter" variability="fixed")";
+    case Causality::input: return R"( causality="input")";
+    case Causality::output: return R"( causality="output")";
+  }
+  return "";
+}
+
+void appendHead(std::string& out, const Description& d, bool structured) {
+  out += "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<fmiModelDescription fmiVersion=\"2.0\"";
+  attribute(out, "modelName", d.name);
+  attribute(out, "guid", d.guid);
+  if (!d.title.empty()) attribute(out, "description", d.title);
+  attribute(out, "generationTool", d.generationTool);
+  attribute(out, "variableNamingConvention", structured ? "structured" : "flat");
+  out += ">\n<CoSimulation";
+  attribute(out, "modelIdentifier", modelIdentifier(d.name));
+  out += R"( canHandleVariableCommunicationStepSize="true" canInterpolateInputs="false" maxOutputDerivativeOrder="0")"
+         R"( canRunAsynchronuously="false" canBeInstantiatedOnlyOncePerProcess="false")"
+         R"( canNotUseMemoryManagementFunctions="true" canGetAndSetFMUstate="true" canSerializeFMUstate="false")"
+         R"( providesDirectionalDerivative="false"/>)"
+         "\n";
+}
+
+void appendDefinitions(std::string& out) {
+  out += "<UnitDefinitions>\n";
+  for (const UnitRow& u : units)
+    out += std::string("<Unit name=\"") + u.name + "\"><BaseUnit" + u.base + "/></Unit>\n";
+  out += "</UnitDefinitions>\n<TypeDefinitions>\n";
+  for (const UnitRow& u : units)
+    out += std::string("<SimpleType name=\"") + u.quantity + "\"><Real quantity=\"" + u.quantity + "\" unit=\"" +
+           u.name + "\"/></SimpleType>\n";
+  out += "</TypeDefinitions>\n<LogCategories>\n";
+  for (const LogCategory& c : logCategories) {
+    out += "<Category";
+    attribute(out, "name", c.name);
+    attribute(out, "description", c.description);
+    out += "/>\n";
+  }
+  out += "</LogCategories>\n";
+}
+
+void appendVariables(std::string& out, const std::vector<Block>& blocks, const std::vector<Place>& places,
+                     const double* start) {
+  std::vector<std::string> tails;  // what every variable of a block has in common, up to the start value
+  for (const Block& b : blocks) {
+    const auto unit =
+        std::find_if(std::begin(units), std::end(units), [&](const UnitRow& u) { return b.unit == u.name; });
+    std::string tail = "\"";
+    tail += causalityAttributes(b.causality);
+    tail += std::string("><Real declaredType=\"") + unit->quantity + "\" unit=\"" + unit->name + "\"";
+    tails.push_back(tail);
+  }
+  out += "<ModelVariables>\n";
+  for (const Place& p : places) {
+    const Block& b = blocks[p.block];
+    const bool hasStart = b.causality == Causality::input || b.causality == Causality::parameter;
+    for (int k = 0; k < b.components; ++k) {
+      const std::size_t offset = static_cast<std::size_t>(p.element) * b.components + k;
+      out += "<ScalarVariable name=\"";
+      out += variableName(b, p.element, k);
+      out += "\" valueReference=\"";
+      appendNumber(out, b.reference + offset);
+      out += "\" description=\"";
+      out += b.description;
+      if (!b.prefix.empty()) {
+        out += " (node ";
+        out += std::to_string(b.ids[p.element]);
+        out += ')';
+      }
+      out += tails[p.block];
+      if (hasStart) {
+        out += " start=\"";
+        appendNumber(out, start[b.place + offset]);
+        out += '"';
+      }
+      out += "/></ScalarVariable>\n";
+    }
+  }
+  out += "</ModelVariables>\n";
+}
+
+// Writes ModelStructure: outputs depend on inputs; initial unknowns on inputs and parameters.
+class Structure {
+ public:
+  Structure(std::string& text, const Model& model, const std::vector<Block>& table, const std::vector<Place>& places)
+      : out(text), blocks(table), listed(places), rows(dependencies(model, table)) {
+    index.resize(rows.all.size());
+    isParameter.resize(rows.all.size());
+    std::uint32_t next = 1;
+    for (const Place& p : listed)
+      for (int k = 0; k < blocks[p.block].components; ++k) {
+        const std::size_t r = reference(p, k);
+        index[r] = next++;
+        isParameter[r] = blocks[p.block].causality == Causality::parameter;
+      }
+  }
+
+  void append() {
+    out += "<ModelStructure>\n";
+    list("Outputs", false);
+    list("InitialUnknowns", true);
+    out += "</ModelStructure>\n";
+  }
+
+ private:
+  std::size_t reference(const Place& p, int component) const {
+    const Block& b = blocks[p.block];
+    return b.reference + static_cast<std::size_t>(p.element) * b.components + component;
+  }
+
+  void list(const char* element, bool initial) {
+    const std::size_t before = out.size();
+    out += std::string("<") + element + ">\n";
+    const std::size_t empty = out.size();
+    for (const Place& p : listed) {
+      const Causality c = blocks[p.block].causality;
+      if (c == Causality::output || (initial && c == Causality::calculatedParameter))
+        for (int k = 0; k < blocks[p.block].components; ++k) unknown(reference(p, k), initial);
+    }
+    if (out.size() == empty)
+      out.resize(before);  // the schema wants at least one entry
+    else
+      out += std::string("</") + element + ">\n";
+  }
+
+  void unknown(std::size_t r, bool initial) {
+    out += "<Unknown index=\"";
+    appendNumber(out, index[r]);
+    out += '"';
+    if (!rows.all[r]) {
+      row.clear();
+      for (std::size_t i = rows.begin[r]; i < rows.begin[r + 1]; ++i) {
+        const Dependency& d = rows.entries[i];
+        if (!isParameter[d.reference])
+          row.push_back({index[d.reference], initial && d.kind == Dependence::fixed ? Dependence::dependent : d.kind});
+        else if (initial)
+          row.push_back({index[d.reference], d.kind});
+      }
+      std::sort(row.begin(), row.end(),
+                [](const Dependency& a, const Dependency& b) { return a.reference < b.reference; });
+      out += " dependencies=\"";
+      for (const Dependency& d : row) {
+        appendNumber(out, d.reference);
+        out += ' ';
+      }
+      closeList();
+      out += " dependenciesKind=\"";
+      for (const Dependency& d : row)
+        out += d.kind == Dependence::constant ? "constant " : d.kind == Dependence::fixed ? "fixed " : "dependent ";
+      closeList();
+    }
+    out += "/>\n";
+  }
+
+  void closeList() {
+    if (out.back() == ' ') out.pop_back();
+    out += '"';
+  }
+
+  std::string& out;
+  const std::vector<Block>& blocks;
+  const std::vector<Place>& listed;
+  const Dependencies rows;
+  std::vector<std::uint32_t> index;  // of each value reference in the listing, from 1
+  std::vector<std::uint8_t> isParameter;
+  std::vector<Dependency> row;  // here `reference` is an index
+};
+
+}  // namespace
+
+std::string modelIdentifier(const std::string& name) {
+  std::string identifier;
+  for (char c : name) {
+    const bool letter = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_', digit = c >= '0' && c <= '9';
+    if (digit && identifier.empty()) identifier += '_';
+    identifier += letter || digit ? c : '_';
+  }
+  return identifier.empty() ? "_" : identifier;
+}
+
+std::string xml(const Model& model, const Description& description) {
+  // The model is the caller's and outlives the simulation.
+  Simulation simulation(std::shared_ptr<const Model>(std::shared_ptr<void>(), &model));
+  const std::vector<double> start(simulation.data(), simulation.data() + simulation.layout().size);
+  simulation.initialise(0);
+  const std::vector<Block> blocks = variables(model, simulation.layout());
+  const std::vector<Place> places = listing(blocks);
+  std::size_t count = 0;
+  for (const Block& b : blocks) count += b.count();
+
+  std::string out;
+  appendHead(out, description, count <= mostStructuredNames);
+  appendDefinitions(out);
+  const Experiment experiment = defaultExperiment(model, simulation);
+  out += "<DefaultExperiment startTime=\"0\" stopTime=\"";
+  appendNumber(out, experiment.stop);
+  out += "\" stepSize=\"";
+  appendNumber(out, experiment.step);
+  out += "\"/>\n";
+  appendVariables(out, blocks, places, start.data());
+  Structure(out, model, blocks, places).append();
+  out += "</fmiModelDescription>\n";
+  return out;
+}
+
+}  // namespace tiefmu
