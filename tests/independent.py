@@ -169,33 +169,36 @@ def default_search_distance(position, segments):
     return np.sqrt(np.mean(np.sum(np.vstack(edges) ** 2, axis=1)))
 
 
-def find(position, segments, ids, s, method, reach, tie=1e-9):
-    """(index of the winning segment, its projection) or (None, None). segments: node index tuples."""
+def find(position, segments, ids, points, method, reach, tie=1e-9):
+    """Per point: (index of the winning segment, its projection), or (None, None). segments: node index tuples."""
     usable = [e for e in range(len(segments)) if not no_area(position[list(segments[e])])]
-    size = reach
-    if method == "nearest-node":
-        nodes = sorted({n for e in usable for n in segments[e]})
-        inside = [n for n in nodes if np.all(np.abs(position[n] - s) <= reach / 2)]
-        if not inside:
-            return None, None
-        nearest = min(np.linalg.norm(position[n] - s) for n in inside)
-        held = {n for n in inside if np.linalg.norm(position[n] - s) <= nearest + tie * size}
-        rated = [(0.0, e, project(position[list(segments[e])], s)) for e in usable if held & set(segments[e])]
-    else:
-        rated = []
-        for e in usable:
-            corners = position[list(segments[e])]
-            p = project(corners, s)
-            inside = p.outside <= 1 + tie
-            rated.append((p.distance if inside else np.linalg.norm(corners - s, axis=1).min(), e, p))
-        rated = [c for c in rated if c[0] <= reach]
-        if not rated:
-            return None, None
-    best = min(c[0] for c in rated)
-    rated = [c for c in rated if c[0] <= best + tie * size]
-    least = min(c[2].outside for c in rated)
-    _, e, p = min((c for c in rated if c[2].outside <= least + tie), key=lambda c: ids[c[1]])
-    return (e, p) if p.outside <= 1.5 else (None, None)
+    local = np.full((len(points), len(segments), 2), np.nan)
+    outside, distance, nearest = (np.full((len(points), len(segments)), np.inf) for _ in range(3))
+    for e in usable:
+        corners = position[list(segments[e])]
+        local[:, e] = local_coordinates(np.broadcast_to(corners, (len(points), *corners.shape)), points)
+        phi = shape(len(corners), *local[:, e].T)
+        distance[:, e] = np.linalg.norm(phi.T @ corners - points, axis=1)
+        nearest[:, e] = np.linalg.norm(corners - points[:, None], axis=2).min(axis=1)
+        outside[:, e] = np.max(1 - 2 * phi, axis=0) if len(corners) == 3 else np.abs(local[:, e]).max(axis=1)
+    answer, slack = [], tie * reach
+    for k, s in enumerate(points):
+        if method == "nearest-node":
+            held = {n for e in usable for n in segments[e] if np.all(np.abs(position[n] - s) <= reach / 2)}
+            gap = {n: np.linalg.norm(position[n] - s) for n in held}
+            held = {n for n in held if gap[n] <= min(gap.values()) + slack}
+            rated = [e for e in usable if held & set(segments[e])]
+        else:
+            rank = np.where(outside[k] <= 1 + tie, distance[k], nearest[k])
+            best = rank.min()
+            rated = [e for e in usable if best <= reach and rank[e] <= best + slack]
+        least = min((outside[k, e] for e in rated), default=np.inf)
+        if least > 1.5:
+            answer.append((None, None))
+            continue
+        e = min((e for e in rated if outside[k, e] <= least + tie), key=lambda e: ids[e])
+        answer.append((e, Projection(position[list(segments[e])], *local[k, e], s)))
+    return answer
 
 
 # ---- rotations and springs -------------------------------------------------------------------------------------------
@@ -298,8 +301,9 @@ class Problem:
             position = np.array([where[n] for n in ids])
             segments = [tuple(index[n] for n in segment_nodes[e]) for e in segment_ids]
             reach = tie.get("search_distance", 0) or default_search_distance(position, segments)
-            for i in tie["slaves"]:
-                e, p = find(position, segments, segment_ids, where[i], tie.get("search", "box"), reach)
+            points = np.array([where[i] for i in tie["slaves"]])
+            winners = find(position, segments, segment_ids, points, tie.get("search", "box"), reach)
+            for i, (e, p) in zip(tie["slaves"], winners):
                 if e is None:
                     raise ValueError(f"slave {i} not found")
                 found.append((i, tie, segment_nodes[segment_ids[e]], segment_ids[e], p))
