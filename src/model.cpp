@@ -107,6 +107,7 @@ class Compiler {
       passedOver += (passedOver.empty() ? "" : ", ") + segmentId(spec.segments[k]);
     }
     const double distance = spec.searchDistance > 0 ? spec.searchDistance : search.defaultDistance();
+    model.searchDistance.push_back(distance);
     for (int s : spec.slaves) {
       const Vec3& x = scene.nodes.position[s];
       const Match match = spec.search == SearchMethod::box ? search.box(x, distance) : search.nearestNode(x, distance);

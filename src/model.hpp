@@ -105,6 +105,7 @@ struct Model {
 
   // what the report says
   std::vector<std::string> tieName;
+  std::vector<double> searchDistance;      // per tie: as given, or the default, m
   std::vector<SlaveReport> slaveReport;    // in slave order
   std::vector<Finding> findings;
   std::vector<Dropped> dropped;

@@ -1,0 +1,75 @@
+"""Packing a scene as an FMU. The same scene and the same binary give the same bytes."""
+
+import hashlib
+import json
+import os
+import sys
+import uuid
+import zipfile
+from importlib.metadata import version
+from pathlib import Path
+
+from . import _core
+from ._core import SceneError
+from .report import report
+from .scene import Scene
+
+PLATFORM, SUFFIX = {"win32": ("win64", ".dll"), "darwin": ("darwin64", ".dylib")}.get(sys.platform, ("linux64", ".so"))
+
+
+def build(scene: Scene, path) -> Path:
+    """Writes the FMU to `path` and returns it. Nothing is left behind when it fails; SceneError says why."""
+    path = Path(path)
+    if not path.parent.is_dir():
+        raise SceneError(f"{path}: folder {path.parent} does not exist")
+    if path.is_dir():
+        raise SceneError(f"{path}: is a folder")
+    part = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        with zipfile.ZipFile(part, "w", zipfile.ZIP_DEFLATED) as archive:
+            for name, data in sorted(contents(scene).items()):
+                archive.writestr(entry(name), data)
+        part.replace(path)
+    except OSError as error:
+        raise SceneError(f"{path}: {error.strerror}") from None
+    finally:
+        part.unlink(missing_ok=True)
+    return path
+
+
+def contents(scene: Scene) -> dict[str, bytes]:
+    """Path in the archive -> bytes."""
+    identifier = _core.model_identifier(scene.name)
+    guid = model_guid(scene)
+    return {
+        "modelDescription.xml": scene.model.xml(scene.name, scene.title, guid),
+        f"binaries/{PLATFORM}/{identifier}{SUFFIX}": binary(),
+        "resources/scene.bin": scene.model.resource(guid),
+        "resources/report.json": json.dumps(report(scene), allow_nan=False).encode(),
+    }
+
+
+def model_guid(scene: Scene) -> str:
+    """Changes with everything the FMU's user could notice, and with nothing else."""
+    digest = hashlib.sha256(version("tiefmu").encode())
+    digest.update(scene.model.xml(scene.name, scene.title, ""))
+    digest.update(scene.model.resource(""))
+    return f"{{{uuid.UUID(bytes=digest.digest()[:16])}}}"
+
+
+def binary() -> bytes:
+    """The shared library with the FMI functions, installed beside the solver's module."""
+    folder = Path(_core.__file__).parent / "binaries"
+    files = sorted(folder.glob("tiefmu.*"))
+    if not files:
+        raise SceneError(f"{folder}: the FMU's binary is not installed; install tiefmu again")
+    return files[0].read_bytes()
+
+
+def entry(name: str) -> zipfile.ZipInfo:
+    """An archive member whose metadata does not depend on when, where and by whom it is written."""
+    info = zipfile.ZipInfo(name, date_time=(1980, 1, 1, 0, 0, 0))
+    info.create_system = 3  # Unix, so that the permissions below are read
+    info.external_attr = (0o755 if name.startswith("binaries/") else 0o644) << 16
+    info.compress_type = zipfile.ZIP_DEFLATED
+    return info

@@ -1,0 +1,224 @@
+"""The tie report: as a dict (which is also the JSON), and as text."""
+
+import json
+import zipfile
+from pathlib import Path
+
+import numpy as np
+
+from .scene import MOTIONS, Scene
+from ._core import SceneError
+
+SHOWN = 20  # slaves, masters, points and ids that the text shows; the dict has all
+
+
+def report(scene: Scene) -> dict:
+    """What became of the scene: ties, slaves, masters, points, limits, findings; plain lists and numbers, SI units.
+
+    Keys are those of the JSON. Per slave: xi, eta of the projection and its distance; d = |offset|, to the
+    projection (default) or the segment's barycentre (optimized); `weights` as the tie uses them (Phi, or 1/n);
+    `added`: lumped mass and inertia on each master (THEORY 4). A step that nothing limits is 1e30; an infinite `cond`
+    or `lambda` is null.
+    """
+    found = scene.model.report()
+    slaves, nodes = found["slaves"], found["nodes"]
+    by_id = np.argsort(slaves["id"], kind="stable")
+    return {
+        "title": scene.title,
+        "ties": ties(scene, found),
+        "slaves": slave_rows(scene, found, by_id),
+        "masters": node_rows(scene, nodes, master=True),
+        "points": node_rows(scene, nodes, master=False),
+        "springs": found["springs"],
+        "dropped": [{"id": number, "tie": scene.ties[tie].name, "reason": reason}
+                    for number, tie, reason in found["dropped"]],
+        "left_out": found["left_out"].tolist(),
+        "warnings": found["warnings"],
+        "notes": [*scene.notes, *found["notes"]],
+        "stable_time_step": scene.start.get("stable_time_step").tolist()[0],
+        "nodal_time_step": scene.start.get("nodal_time_step").tolist()[0],
+        "integrator_limit": scene.start.integrator_limit,
+        "freedoms": freedoms(scene, nodes),
+        "variables": variable_counts(scene),
+    }
+
+
+def ties(scene: Scene, found: dict) -> list[dict]:
+    slaves = found["slaves"]
+    rows = []
+    for number, (table, distance) in enumerate(zip(scene.ties, found["search_distance"])):
+        own = slaves["tie"] == number
+        rows.append({"name": table.name, "formulation": table.formulation, "search": table.search,
+                     "search_distance": distance, "segments": len(np.unique(slaves["segment"][own])),
+                     "slaves": int(own.sum())})
+    return rows
+
+
+def slave_rows(scene: Scene, found: dict, order: np.ndarray) -> list[dict]:
+    s = {key: value[order] for key, value in found["slaves"].items()}
+    n, m, inertia = s["corners"], s["mass"], s["inertia"]
+    rotary = inertia + m * s["d"]**2  # I_s + m_s d^2
+    optimized = s["coupling"] == found["couplings"].index("meanMotion")
+    turns_masters = s["coupling"] == found["couplings"].index("rotation")
+    # Lumped additions: seed (1), (2), and (7), (8) with lambda for the matrix.
+    corner = np.arange(4) < n[:, None]
+    share = np.where(optimized[:, None], corner / n[:, None], s["weights"])
+    with np.errstate(invalid="ignore", over="ignore"):  # lambda may be infinite where no optimized tie uses it
+        mean = m / n + rotary * s["lambda"]
+    added_mass = np.where(optimized[:, None], corner * np.where(optimized, mean, 0.0)[:, None],
+                          s["clamped_weights"] * m[:, None])
+    added_inertia = np.where(turns_masters[:, None], s["clamped_weights"] * rotary[:, None], 0.0)
+
+    names = [table.name for table in scene.ties]
+    columns = zip(s["id"].tolist(), s["number"].tolist(), s["tie"].tolist(), s["segment"].tolist(), s["xi"].tolist(),
+                  s["eta"].tolist(), s["distance"].tolist(), s["d"].tolist(), s["offset"].tolist(),
+                  s["nodes"].tolist(), share.tolist(), finite(s["cond"]), s["clamped"].tolist(), finite(s["lambda"]),
+                  added_mass.tolist(), added_inertia.tolist(), n.tolist())
+    return [{"id": number, "number": j, "tie": names[tie], "segment": segment, "xi": xi, "eta": eta,
+             "distance": distance, "d": d, "offset": offset, "nodes": corners[:k], "weights": weights[:k],
+             "cond": cond, "clamped": bool(clamped), "lambda": lambda_,
+             "added": [{"node": corners[i], "mass": masses[i], "inertia": inertias[i]} for i in range(k)]}
+            for number, j, tie, segment, xi, eta, distance, d, offset, corners, weights, cond, clamped, lambda_,
+            masses, inertias, k in columns]
+
+
+def finite(values: np.ndarray) -> list:
+    return [value if known else None for value, known in zip(values.tolist(), np.isfinite(values).tolist())]
+
+
+def node_rows(scene: Scene, nodes: dict, master: bool) -> list[dict]:
+    """One row a master or point, by ascending number."""
+    start, rotating = scene.start, nodes["rotating"]
+    stiffness, added_mass = start.get("stiffness"), start.get("added_mass")
+    added_inertia, rotational_stiffness = start.get("added_inertia"), start.get("rotational_stiffness")
+    rows = []
+    for i in np.argsort(nodes["number"], kind="stable").tolist():
+        if bool(nodes["master"][i]) != master:
+            continue
+        mass = float(nodes["mass"][i])
+        row = {"id": int(nodes["id"][i]), "number": int(nodes["number"][i]), "motion": MOTIONS[nodes["motion"][i]],
+               "rotations": i < rotating, "mass": mass, "added_mass": float(added_mass[i]), "added_inertia": 0.0,
+               "stiffness": float(stiffness[i]), "rotational_stiffness": 0.0}
+        steps = [nodal_step(mass + row["added_mass"], row["stiffness"])]
+        if i < rotating:
+            row["added_inertia"] = float(added_inertia[i])
+            row["rotational_stiffness"] = float(rotational_stiffness[i])
+            steps.append(nodal_step(float(nodes["inertia"][i]) + row["added_inertia"], row["rotational_stiffness"]))
+        row["nodal_time_step"] = min(steps)
+        rows.append(row)
+    return rows
+
+
+def nodal_step(mass: float, stiffness: float) -> float:
+    """Seed (3): sqrt(2 m/K); 1e30 where nothing limits it."""
+    return (2 * mass / stiffness)**0.5 if stiffness > 0 else 1e30
+
+
+def freedoms(scene: Scene, nodes: dict) -> dict:
+    """How many the model keeps - of driven nodes as inputs, of free ones as unknowns - and what it leaves out."""
+    moving = nodes["motion"] != MOTIONS.index("fixed")
+    rotating = np.arange(len(nodes["id"])) < nodes["rotating"]
+    dropped = np.setdiff1d(np.intersect1d(scene.rotations, nodes["id"]), nodes["id"][rotating])
+    left_out = [f"rotations of node {number}" for number in dropped.tolist()]
+    left_out += [f"{MOTIONS[2]} node {number}" for number in np.sort(nodes["id"][~moving]).tolist()]
+    return {"translations": 3 * int(moving.sum()), "rotations": 3 * int((moving & rotating).sum()),
+            "left_out": left_out}
+
+
+def variable_counts(scene: Scene) -> dict:
+    counts = {}
+    for block in scene.start.variables:
+        counts[block["name"]] = counts.get(block["name"], 0) + len(block["numbers"]) * block["components"]
+    return counts
+
+
+def of_fmu(path: Path) -> dict:
+    """The report that an FMU carries; SceneError if it is none of ours."""
+    try:
+        with zipfile.ZipFile(path) as archive:
+            return json.loads(archive.read("resources/report.json"))
+    except KeyError:
+        raise SceneError(f"{path}: holds no resources/report.json, so it was not made by tiefmu") from None
+    except (zipfile.BadZipFile, ValueError):
+        raise SceneError(f"{path}: not an FMU (a zip archive)") from None
+
+
+# ------------------------------------------------------------------------------------------------------------- as text
+
+def text(name: str, found: dict) -> str:
+    """The report as people read it: at most SHOWN slaves, masters and points, and how many more there are."""
+    lines = [f"{name}: {found['title']}" if found["title"] else name,
+             summary(found), ""]
+    for tie in found["ties"]:
+        lines.append(f"tie '{tie['name']}': {tie['formulation']} formulation, search '{tie['search']}' within "
+                     f"{tie['search_distance']:.6g} m: {counted(tie['slaves'], 'slave')} on "
+                     f"{counted(tie['segments'], 'segment')}")
+    lines += ["", *slave_text(found["slaves"])]
+    lines += node_text("master", found["masters"])
+    lines += node_text("point", found["points"])
+    lines += ["steps", f"  stable  {step(found['stable_time_step'])}   2/omega_max of the assembled system",
+              f"  nodal   {step(found['nodal_time_step'])}   smallest sqrt(2 m/K) of the free nodes",
+              f"  method  {step(found['integrator_limit'])}   limit of the chosen integrator", ""]
+    lines.append(f"freedoms: {found['freedoms']['translations']} translations, "
+                 f"{found['freedoms']['rotations']} rotations")
+    lines += listed("  left out: ", found["freedoms"]["left_out"])
+    lines += listed("nodes that no tie and no spring uses, left out: ", found["left_out"])
+    lines += [f"dropped: slave {row['id']} of tie '{row['tie']}': {row['reason']}" for row in found["dropped"][:SHOWN]]
+    lines += more(found["dropped"], "dropped slaves")
+    for key in ("warnings", "notes"):
+        lines += [f"{key[:-1]}: {line}" for line in found[key][:SHOWN]] + more(found[key], key)
+    return "\n".join(lines) + "\n"
+
+
+def slave_text(slaves: list[dict]) -> list[str]:
+    header = f"{'slave':>9} {'j':>6} {'tie':<12} {'segment':>9} {'xi':>9} {'eta':>9} {'d [m]':>11} {'cond':>9}  " \
+             "weight -> master: added mass [kg], inertia [kg m2]"
+    lines = [header] if slaves else []
+    for row in slaves[:SHOWN]:
+        condition = "inf" if row["cond"] is None else f"{row['cond']:.3g}"
+        first = f"{row['id']:>9} {row['number']:>6} {row['tie'][:12]:<12} {row['segment']:>9} {row['xi']:>9.5f} " \
+                f"{row['eta']:>9.5f} {row['d']:>11.5g} {condition:>9}  "
+        for weight, added in zip(row["weights"], row["added"]):
+            lines.append(f"{first}{weight:>8.5f} -> {added['node']}: {added['mass']:.5g}, {added['inertia']:.5g}")
+            first = " " * len(first)
+        if row["clamped"]:
+            lines.append(" " * len(first) + "outside its segment: mass, inertia and stiffness use the projection "
+                                            "clamped to it")
+    return [*lines, *more(slaves, "slaves"), ""] if slaves else []
+
+
+def node_text(what: str, nodes: list[dict]) -> list[str]:
+    if not nodes:
+        return []
+    lines = [f"{what:>9} {'i':>6} {'motion':>7} {'rot':>4} {'mass [kg]':>11} {'added':>11} {'inertia +':>11} "
+             f"{'K [N/m]':>11} {'nodal step [s]':>15}"]
+    for row in nodes[:SHOWN]:
+        lines.append(f"{row['id']:>9} {row['number']:>6} {row['motion']:>7} {'yes' if row['rotations'] else 'no':>4} "
+                     f"{row['mass']:>11.5g} {row['added_mass']:>11.5g} {row['added_inertia']:>11.5g} "
+                     f"{row['stiffness']:>11.5g} {step(row['nodal_time_step']):>15}")
+    return [*lines, *more(nodes, what + "s"), ""]
+
+
+def summary(found: dict) -> str:
+    """How much of everything, in one line."""
+    return ", ".join([*(counted(len(found[f"{what}s"]), what) for what in ("tie", "slave", "master", "point")),
+                      counted(found["springs"], "spring"), counted(sum(found["variables"].values()), "variable")])
+
+
+def counted(n: int, what: str) -> str:
+    return f"{n} {what}" + ("s" if n != 1 else "")
+
+
+def step(seconds: float) -> str:
+    return "no limit" if seconds >= 1e30 else f"{seconds:.6g} s"
+
+
+def more(rows: list, what: str) -> list[str]:
+    return [f"  ... and {len(rows) - SHOWN} more {what} (--json lists all)"] if len(rows) > SHOWN else []
+
+
+def listed(intro: str, items: list) -> list[str]:
+    if not items:
+        return []
+    rest = f" and {len(items) - SHOWN} more" if len(items) > SHOWN else ""
+    return [intro + ", ".join(map(str, items[:SHOWN])) + rest]

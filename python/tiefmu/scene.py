@@ -1,0 +1,234 @@
+"""Reading a scene: from TOML or a dict to the compiled model of the solver.
+
+Order: types (schema.py), mesh (mesh.py), then who is what - node tables, ties, springs, initial velocities - on arrays
+over all nodes of the mesh, in SI. Search and mechanics are checked by the solver when it compiles.
+"""
+
+import os
+import re
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from . import _core, mesh, schema
+from ._core import SceneError
+from .schema import suggestion
+from .units import Units
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
+MOTIONS = ["driven", "free", "fixed"]  # as enum class Motion in src/scene.hpp
+NODE_VALUES = ["mass", "inertia", "stiffness", "rotational_stiffness"]
+
+
+class Scene:
+    """A checked and compiled scene; made by `load`.
+
+    file: how messages call the source; name: of the model, from the file's name; title; notes: remarks of the reading
+    (list of str); ties: the [[tie]] tables in order; rotations: ids of the nodes declared with rotations; model: the
+    compiled `_core.Model`; start: a `_core.Simulation` of it, initialised at time 0.
+    """
+
+    def __init__(self, file: str, name: str, tables: schema.SceneTables, folder: Path):
+        self.file, self.name, self.title, self.ties = file, name, tables.title, tables.tie
+        assembly = Assembly(tables, folder)
+        self.notes = assembly.mesh.notes
+        self.rotations = assembly.mesh.node_id[assembly.rotations]
+        self.model = _core.Model(assembly.scene())
+        self.start = self.simulation()
+        self.start.initialise(0.0)
+
+    def simulation(self) -> _core.Simulation:
+        """A new simulation of this scene, as the FMU runs it; call `initialise(t)` first."""
+        return _core.Simulation(self.model)
+
+
+def load(source) -> Scene:
+    """Reads, checks and compiles a scene.
+
+    source: path of a TOML file, or a dict of the same shape (NumPy arrays may stand for lists; messages call it
+    "scene"; a mesh file is taken relative to the current folder). Raises SceneError, one line
+    "FILE: table: id: message", on the first thing that is wrong.
+    """
+    if isinstance(source, dict):
+        file, name, folder = "scene", "scene", Path(".")
+    else:
+        file, name, folder = os.fspath(source), Path(source).stem, Path(source).parent
+    try:
+        raw = plain(source) if isinstance(source, dict) else read_toml(Path(source))
+        return Scene(file, name, schema.parse(raw), folder)
+    except SceneError as error:
+        raise SceneError(f"{file}: {error}") from None
+
+
+def plain(value):
+    """The same with lists and Python numbers in place of tuples and NumPy arrays and numbers."""
+    if isinstance(value, dict):
+        return {key: plain(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [plain(item) for item in value]
+    return value.tolist() if isinstance(value, (np.ndarray, np.generic)) else value
+
+
+def read_toml(path: Path) -> dict:
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise SceneError("no such file") from None
+    except OSError as error:
+        raise SceneError(error.strerror) from None
+    except UnicodeDecodeError as error:
+        raise SceneError(f"not a text file (byte {error.start} is not UTF-8)") from None
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
+        place = re.fullmatch(r"(.*) \(at (?:line (\d+), column (\d+)|end of document)\)", str(error), re.DOTALL)
+        if not place:
+            raise SceneError(f"not TOML: {error}") from None
+        where = f"line {place[2]}, column {place[3]}" if place[2] else "end of file"
+        raise SceneError(f"{where}: not TOML: {place[1]}") from None
+
+
+class Assembly:
+    """The scene on arrays over all nodes of the mesh, index by index."""
+
+    def __init__(self, tables: schema.SceneTables, folder: Path):
+        self.tables = tables
+        self.units = Units(**tables.units.model_dump())
+        self.mesh = mesh.build(tables.mesh, folder)
+        if not tables.tie and not tables.spring:
+            raise SceneError("the scene has neither a tie nor a spring; give at least one [[tie]]")
+        n = len(self.mesh.node_id)
+        self.position = self.units.si("position", self.mesh.position)
+        self.motion = np.zeros(n, np.uint8)
+        self.motion_table = np.zeros(n, int)  # number of the table that names the node and sets its motion, or 0
+        self.rotations = np.zeros(n, bool)
+        self.values = {key: np.zeros(n) for key in NODE_VALUES}
+        self.velocity, self.spin = np.zeros((n, 3)), np.zeros((n, 3))
+        for number, table in enumerate(tables.node, 1):
+            self.apply_node_table(f"node table {number}", number, table)
+        self.ties = self.resolve_ties()
+        self.springs = self.resolve_springs()
+        for number, table in enumerate(tables.initial, 1):
+            self.apply_initial(f"initial {number}", table)
+
+    # which nodes and segments a table means: sorted or as listed, as indices
+
+    def nodes(self, where: str, wanted) -> np.ndarray:
+        m = self.mesh
+        return select(where, wanted, "node", m.node_id, m.node_sets, {})
+
+    def segments(self, where: str, wanted) -> np.ndarray:
+        m = self.mesh
+        return select(where, wanted, "segment", m.segment_id, m.segment_sets, m.node_sets)
+
+    def apply_node_table(self, where: str, number: int, table: schema.Node):
+        nodes = self.nodes(f"{where}: nodes", table.nodes)
+        if table.motion is not None:
+            self.motion[nodes] = MOTIONS.index(table.motion)
+            self.motion_table[nodes] = 0 if table.nodes == "all" else number
+        if table.rotations is not None:
+            self.rotations[nodes] = table.rotations
+        for key, values in self.values.items():
+            if getattr(table, key) is not None:
+                values[nodes] = self.units.si(key, getattr(table, key))
+
+    def resolve_ties(self) -> list[tuple[str, np.ndarray, np.ndarray]]:
+        """(name, segments, slaves) of each tie."""
+        ties, names = [], set()
+        for number, table in enumerate(self.tables.tie, 1):
+            table.name = table.name or str(number)
+            where = f"tie '{table.name}'"
+            if table.name in names:
+                raise SceneError(f"{where}: this name is repeated")
+            names.add(table.name)
+            segments = self.segments(f"{where}: segments", table.segments)
+            slaves = self.nodes(f"{where}: slaves", table.slaves)
+            fixed = slaves[(self.motion[slaves] == MOTIONS.index("fixed")) & (self.motion_table[slaves] > 0)]
+            if len(fixed):
+                raise SceneError(f"{where}: slave {self.mesh.node_id[fixed[0]]}: constrained twice, by the tie and by "
+                                 f"motion = 'fixed' in node table {self.motion_table[fixed[0]]}; take it out of one")
+            ties.append((table.name, segments, slaves))
+        return ties
+
+    def resolve_springs(self) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Ends (a, b) of the springs of each table; b is -1 for ground."""
+        springs = []
+        for number, table in enumerate(self.tables.spring, 1):
+            where = f"spring {number}"
+            if table.nodes is not None:
+                a, b = self.nodes(f"{where}: nodes", table.nodes)
+                springs.append((np.array([a]), np.array([b])))
+            else:
+                a = self.nodes(f"{where}: ground", table.ground)
+                springs.append((a, np.full(len(a), -1)))
+        return springs
+
+    def apply_initial(self, where: str, table: schema.Initial):
+        nodes = self.nodes(f"{where}: nodes", table.nodes)
+        slave = np.zeros(len(self.motion), bool)
+        for _, _, slaves in self.ties:
+            slave[slaves] = True
+        fixed = self.motion == MOTIONS.index("fixed")
+        if table.nodes == "all":
+            nodes = nodes[~(slave | fixed)[nodes]]
+        for mask, what in ((slave, "a slave: its motion comes from its tie"), (fixed, "fixed")):
+            bad = nodes[mask[nodes]]
+            if len(bad):
+                raise SceneError(f"{where}: nodes: node {self.mesh.node_id[bad[0]]} is {what}")
+        if table.v is not None:
+            self.velocity[nodes] = self.units.si("v", table.v)
+        if table.w is not None:
+            still = nodes[~self.rotations[nodes]]
+            if len(still) and table.nodes != "all":
+                raise SceneError(f"{where}: w: node {self.mesh.node_id[still[0]]} has no rotations; "
+                                 "set rotations = true in a node table, or leave w out")
+            turning = nodes[self.rotations[nodes]]
+            if not len(turning):
+                raise SceneError(f"{where}: w: no node has rotations; set rotations = true in a node table, or leave "
+                                 "w out")
+            self.spin[turning] = self.units.si("w", table.w)
+
+    def scene(self) -> _core.Scene:
+        """What the solver compiles."""
+        scene, si = _core.Scene(), self.units.si
+        scene.set_nodes(self.mesh.node_id, self.position, self.motion, self.rotations.astype(np.uint8),
+                        *(self.values[key] for key in NODE_VALUES), self.velocity, self.spin)
+        scene.set_segments(self.mesh.segment_id, self.mesh.segments)
+        for table, (name, segments, slaves) in zip(self.tables.tie, self.ties):
+            scene.add_tie(name, segments.astype(np.int32), slaves.astype(np.int32), table.formulation, table.search,
+                          si("search_distance", table.search_distance), table.unresolved == "drop")
+        for number, (table, (a, b)) in enumerate(zip(self.tables.spring, self.springs), 1):
+            scene.add_springs(f"spring {number}", a.astype(np.int32), b.astype(np.int32), table.kind,
+                              *(np.broadcast_to(si(key, getattr(table, key)), 3).copy() for key in
+                                ("stiffness", "damping", "rotational_stiffness", "rotational_damping")))
+        model, integrator, interface = self.tables.model, self.tables.integrator, self.tables.interface
+        scene.set_settings(inertia=model.inertia, reaction=model.reaction, geometry=model.geometry,
+                           position=model.position, gravity=si("gravity", model.gravity), method=integrator.method,
+                           time_step=si("time_step", integrator.time_step), safety=integrator.safety,
+                           expose=interface.expose, hide=interface.hide)
+        return scene
+
+
+def select(where: str, wanted, what: str, ids: np.ndarray, sets: dict, other_sets: dict) -> np.ndarray:
+    """Indices of the nodes or segments (`what`) that "all", a set's name or a list of ids means."""
+    if isinstance(wanted, list):
+        index = mesh.find(ids, np.array(wanted, np.int64))
+        if (index < 0).any():
+            missing = wanted[int(np.argmax(index < 0))]
+            raise SceneError(f"{where}: {what} {missing} is not in the mesh{mesh.span(ids)}")
+        return index
+    if wanted == "all":
+        if not len(ids):
+            raise SceneError(f"{where}: the mesh has no {what}s")
+        return np.arange(len(ids))
+    if wanted not in sets:
+        if wanted in other_sets:
+            raise SceneError(f"{where}: '{wanted}' is a set of nodes, not of {what}s")
+        known = suggestion(wanted, sets) or f"; it has no sets of {what}s: give ids or 'all'"
+        raise SceneError(f"{where}: the mesh has no set '{wanted}'{known}")
+    if not len(sets[wanted]):
+        raise SceneError(f"{where}: the set '{wanted}' holds no {what}")
+    return sets[wanted]

@@ -1,0 +1,308 @@
+"""Tables, keys and types of a scene file, and what is said when they are wrong.
+
+Only what one table shows by itself is checked here. References between tables and units are the matter of scene.py.
+"""
+
+import difflib
+import sys
+from typing import Annotated, Any, Literal
+
+from pydantic import (AfterValidator, BaseModel, ConfigDict, Field, PlainValidator, ValidationError, model_validator)
+from pydantic_core import PydanticCustomError
+
+from ._core import SceneError
+from .units import LENGTHS, MASSES, TIMES
+
+
+def suggestion(word: str, known) -> str:
+    """'; did you mean ...?', or the list of what is known when nothing is close."""
+    close = difflib.get_close_matches(word, known, n=1, cutoff=0.6)
+    if close:
+        return f"; did you mean '{close[0]}'?"
+    known = sorted(known)
+    return f"; known: {', '.join(known[:12])}{', ...' if len(known) > 12 else ''}" if known else ""
+
+
+def found(value: Any) -> str:
+    """How a message shows a value of the file."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, str):
+        return f"'{shortened(value)}'"
+    if isinstance(value, dict):
+        return "a table"
+    if isinstance(value, (list, tuple)):
+        return f"[{', '.join(map(found, value))}]" if len(value) <= 5 else f"a list of {len(value)} values"
+    return shortened(str(value))
+
+
+def shortened(text: str) -> str:
+    return text if len(text) <= 40 else f"{text[:37]}..."
+
+
+def wrong(message: str) -> PydanticCustomError:
+    # braces would be taken for a template
+    return PydanticCustomError("scene", "{message}", {"message": message})
+
+
+def is_number(value: Any) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool)
+
+
+def selection(value: Any) -> str | list[int]:
+    """"all", the name of a set, or a list of ids."""
+    if isinstance(value, str):
+        if not value:
+            raise wrong("the name of the set is empty")
+        return value
+    if not isinstance(value, list):
+        raise wrong(f"expected a list of ids, a set name or 'all', found {found(value)}")
+    if not value:
+        raise wrong("the list is empty; give at least one id")
+    seen = set()
+    for item in value:
+        if type(item) is not int or not 1 <= item < 2**63:
+            raise wrong(f"expected ids (whole numbers from 1), found {found(item)}")
+        if item in seen:
+            raise wrong(f"id {item} is repeated")
+        seen.add(item)
+    return value
+
+
+def finite(value: float) -> float:
+    if not abs(value) <= sys.float_info.max:
+        raise wrong(f"{found(value)} is not a finite number")
+    return value
+
+
+def not_negative(value: float) -> float:
+    if value < 0:
+        raise wrong(f"{value:g} is negative; it must be 0 or more")
+    return value
+
+
+def number_or_vector(value: Any) -> float | list[float]:
+    """A number or [x, y, z], none of them negative."""
+    if is_number(value):
+        return not_negative(finite(value))
+    if not isinstance(value, list) or len(value) != 3 or not all(map(is_number, value)):
+        raise wrong(f"expected a number or [x, y, z], found {found(value)}")
+    return [not_negative(finite(number)) for number in value]
+
+
+def vector(value: Any) -> list[float]:
+    if not isinstance(value, list) or len(value) != 3 or not all(map(is_number, value)):
+        raise wrong(f"expected [x, y, z], found {found(value)}")
+    return [finite(number) for number in value]
+
+
+def two_nodes(value: Any) -> list[int]:
+    if not isinstance(value, list) or len(value) != 2:
+        raise wrong(f"expected two node ids, found {found(value)}")
+    return selection(value)
+
+
+Id = Annotated[int, Field(ge=1, le=2**63 - 1)]
+Positive = Annotated[float, Field(gt=0)]
+NotNegative = Annotated[float, AfterValidator(not_negative)]
+NotNegativeVector = Annotated[Any, PlainValidator(number_or_vector)]
+Vector = Annotated[Any, PlainValidator(vector)]
+TwoNodes = Annotated[Any, PlainValidator(two_nodes)]
+Selection = Annotated[Any, PlainValidator(selection)]
+
+
+class Table(BaseModel):
+    # strict: true is not a number, "1" is not one either
+    model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
+
+
+class Units(Table):
+    length: Literal[tuple(LENGTHS)] = "m"
+    mass: Literal[tuple(MASSES)] = "kg"
+    time: Literal[tuple(TIMES)] = "s"
+
+
+class Mesh(Table):
+    file: str | None = None
+    nodes: list[Annotated[tuple[Id, float, float, float], Field(strict=False)]] = []
+    segments: list[Annotated[list[Id], Field(min_length=4, max_length=5)]] = []
+
+
+class Node(Table):
+    nodes: Selection
+    motion: Literal["driven", "free", "fixed"] | None = None
+    rotations: bool | None = None
+    mass: NotNegative | None = None
+    inertia: NotNegative | None = None
+    stiffness: NotNegative | None = None
+    rotational_stiffness: NotNegative | None = None
+
+
+class Tie(Table):
+    name: Annotated[str, Field(min_length=1)] | None = None  # None: its number
+    segments: Selection = "all"
+    slaves: Selection
+    formulation: Literal["default", "optimized"] = "default"
+    search: Literal["box", "nearest-node"] = "box"
+    search_distance: NotNegative = 0.0
+    unresolved: Literal["error", "drop"] = "error"
+
+
+class Spring(Table):
+    nodes: TwoNodes | None = None
+    ground: Selection | None = None
+    kind: Literal["axial", "bushing"] = "axial"
+    stiffness: NotNegativeVector = 0.0
+    damping: NotNegativeVector = 0.0
+    rotational_stiffness: NotNegativeVector = 0.0
+    rotational_damping: NotNegativeVector = 0.0
+
+    @model_validator(mode="after")
+    def ends(self):
+        if (self.nodes is None) == (self.ground is None):
+            raise wrong("give either nodes = [a, b] or ground = [ids], "
+                        + ("not both" if self.nodes else "found neither"))
+        if self.kind == "bushing":
+            return self
+        for key in ("rotational_stiffness", "rotational_damping"):
+            if key in self.model_fields_set:
+                raise wrong(f"{key}: an axial spring has none; use kind = 'bushing'")
+        for key in ("stiffness", "damping"):
+            if isinstance(getattr(self, key), list):
+                raise wrong(f"{key}: an axial spring takes one number, found {found(getattr(self, key))}")
+        return self
+
+
+class Initial(Table):
+    nodes: Selection
+    v: Vector | None = None
+    w: Vector | None = None
+
+    @model_validator(mode="after")
+    def something(self):
+        if self.v is None and self.w is None:
+            raise wrong("give v = [x, y, z] or w = [x, y, z]")
+        return self
+
+
+class Model(Table):
+    inertia: Literal["lumped", "consistent"] = "lumped"
+    reaction: Literal["loads", "full", "split"] = "loads"
+    geometry: Literal["finite", "small"] = "finite"
+    position: Literal["integrated", "input"] = "integrated"
+    gravity: Vector = [0.0, 0.0, 0.0]
+
+
+class Integrator(Table):
+    method: Literal["central-difference", "symplectic-euler", "noh-bathe", "rk4"] = "central-difference"
+    time_step: NotNegative = 0.0
+    safety: Annotated[Positive, Field(le=1)] = 0.9
+
+
+class Interface(Table):
+    expose: list[str] = []
+    hide: list[str] = []
+
+
+class SceneTables(Table):
+    """A whole scene file."""
+    title: str = ""
+    units: Units = Units()
+    mesh: Mesh
+    node: list[Node] = []
+    tie: list[Tie] = []
+    spring: list[Spring] = []
+    initial: list[Initial] = []
+    model: Model = Model()
+    integrator: Integrator = Integrator()
+    interface: Interface = Interface()
+
+
+TABLES = {"units": Units, "mesh": Mesh, "node": Node, "tie": Tie, "spring": Spring, "initial": Initial, "model": Model,
+          "integrator": Integrator, "interface": Interface}
+ARRAYS = ("node", "tie", "spring", "initial")  # written [[node]]
+
+
+def parse(raw: dict) -> SceneTables:
+    """The tables of a scene; SceneError names the first thing that is wrong."""
+    try:
+        return SceneTables.model_validate(raw)
+    except ValidationError as error:
+        raise SceneError(describe(error.errors(include_url=False)[0], raw)) from None
+
+
+def table_name(key: str, number: int, table: Any) -> str:
+    """How messages call the table `number` (from 1) of the array of tables `key`."""
+    if key == "tie" and isinstance(table, dict) and isinstance(table.get("name"), str) and table["name"]:
+        return f"tie '{table['name']}'"
+    return f"node table {number}" if key == "node" else f"{key} {number}"
+
+
+def describe(error: dict, raw: dict) -> str:
+    """One line for an error of pydantic: table, key or id, what was found, what would be right."""
+    location, kind = list(error["loc"]), error["type"]
+    where, model = [], SceneTables
+    if len(location) > 1 and location[0] in ARRAYS:
+        head, index = location[:2]
+        where.append(table_name(head, index + 1, raw[head][index]))
+        model, location = TABLES[head], location[2:]
+    elif location[:1] == ["mesh"] and len(location) > 2 and isinstance(location[2], int):
+        return ": ".join(["mesh", mesh_row(location[1], location[2:], raw["mesh"][location[1]], error)])
+    elif len(location) > 1 and location[0] in TABLES:
+        where.append(location[0])
+        model, location = TABLES[location[0]], location[1:]
+
+    if kind == "extra_forbidden":
+        key = str(location[-1])
+        return ": ".join([*where, f"unknown key '{key}'{suggestion(key, model.model_fields)}"])
+    where += [f"entry {part + 1}" if isinstance(part, int) else str(part) for part in location]
+    return ": ".join([*where, explain(error)])
+
+
+def mesh_row(table: str, location: list, rows: list, error: dict) -> str:
+    """A wrong row of mesh.nodes or mesh.segments; location: row and perhaps column."""
+    row = rows[location[0]]
+    shape = "[id, x, y, z]" if table == "nodes" else "[id, then three or four node ids]"
+    named = isinstance(row, (list, tuple)) and len(row) > 0 and type(row[0]) is int
+    where = f"{table[:-1]} {row[0]}" if named else f"{table}: row {location[0] + 1}"
+    if len(location) == 1 or error["type"] == "missing":
+        return f"{where}: expected {shape}, found {found(row)}"
+    column = location[1]
+    if column == 0 and named:
+        where = f"{table}: row {location[0] + 1}"
+    names = ["id", "x", "y", "z"] if table == "nodes" else ["id"] + [f"node {i}" for i in range(1, 5)]
+    return f"{where}: {names[column]}: {explain(error)}"
+
+
+EXPECTED = {
+    "float_type": "a number", "float_parsing": "a number", "int_type": "a whole number",
+    "int_from_float": "a whole number", "int_parsing_size": "a smaller number", "bool_type": "true or false",
+    "string_type": "a text", "list_type": "a list", "tuple_type": "a list", "model_type": "a table",
+    "model_attributes_type": "a table", "dict_type": "a table",
+}
+
+
+def explain(error: dict) -> str:
+    """What was found and what would be right."""
+    kind, value, context = error["type"], error["input"], error.get("ctx", {})
+    if kind == "scene":
+        return error["msg"]
+    if kind == "missing":
+        return "is missing"
+    if kind == "literal_error":
+        return f"{found(value)} is not one of {context['expected'].replace(' or ', ', ')}"
+    if kind == "finite_number":
+        return f"{value} is not a finite number"
+    if kind == "list_type" and error["loc"][-1] in ARRAYS:
+        return f"expected tables written [[{error['loc'][-1]}]], found {found(value)}"
+    if kind in EXPECTED:
+        return f"expected {EXPECTED[kind]}, found {found(value)}"
+    if kind == "greater_than_equal":
+        return f"{found(value)} is too small; it must be at least {context['ge']}"
+    if kind == "greater_than":
+        return f"{found(value)} is too small; it must be more than {context['gt']:g}"
+    if kind == "less_than_equal":
+        return f"{found(value)} is too large; it must be at most {context['le']:g}"
+    if kind == "string_too_short":
+        return "is empty"
+    return f"{error['msg']}, found {found(value)}"
