@@ -1,0 +1,73 @@
+"""The packaged FMU, driven by FMPy, against the solver in process (the same bits) and against independent.py."""
+
+import fmpy
+import numpy as np
+import pytest
+from fmpy.fmi2 import FMU2Slave
+
+import tiefmu
+from in_process import EXPOSED, Run
+from independent import Problem
+from random_scenes import structure
+
+END = 0.4
+STEPS = [0.01, 0.03, 0.0005, 0.0595] * 4  # s, irregular on purpose
+
+
+class Instance:
+    """An FMU between instantiation and termination, by variable names."""
+
+    def __init__(self, path, folder, inputs):
+        description = fmpy.read_model_description(str(path))
+        self.reference = {v.name: v.valueReference for v in description.modelVariables}
+        self.fmu = FMU2Slave(guid=description.guid, unzipDirectory=fmpy.extract(str(path), str(folder)),
+                             modelIdentifier=description.coSimulation.modelIdentifier, instanceName="one")
+        self.time = 0.0
+        self.fmu.instantiate()
+        self.fmu.setupExperiment(startTime=0.0)
+        self.fmu.enterInitializationMode()
+        self.set(inputs)
+        self.fmu.exitInitializationMode()
+
+    def set(self, values):
+        for name, vector in values.items():
+            for k, value in enumerate(vector, start=1):
+                self.fmu.setReal([self.reference[f"{name}[{k}]"]], [value])
+
+    def __getitem__(self, name):
+        scalar = name in self.reference
+        names = [name] if scalar else [f"{name}[{k}]" for k in (1, 2, 3)]
+        values = np.array(self.fmu.getReal([self.reference[n] for n in names]))
+        return values[0] if scalar else values
+
+    def step(self, duration):
+        self.fmu.doStep(self.time, duration)
+        self.time += duration
+
+
+@pytest.mark.parametrize("method", ["central-difference", "rk4"])
+@pytest.mark.parametrize("formulation, rotations", [("default", True), ("default", False), ("optimized", False)])
+def test_fmu(tmp_path, formulation, rotations, method):
+    scene = structure(np.random.default_rng(21), formulation, rotations, "consistent")
+    scene |= {"integrator": {"method": method}, "interface": {"expose": EXPOSED}}
+    loads = {"slave[1].f": [3.0, -2.0, 5.0], "master[2].f_ext": [0.0, 1.0, 2.0], "point[1].f_ext": [1.0, 1.0, 0.0]}
+    path = tiefmu.build(tiefmu.load(scene), tmp_path / "structure.fmu")
+    instance, run = Instance(path, tmp_path / "files", loads), Run(scene, inputs=loads)
+    names = [name for name in run.components if not name.startswith("integrator.")]
+    assert {n for name in names for n in run.components[name]} <= set(instance.reference)
+    for duration in STEPS:
+        instance.step(duration)
+        run.step(duration)
+        for name in names:
+            assert np.array_equal(instance[name], run[name]), name
+
+    inputs = {("f", 101): loads["slave[1].f"], ("f", 2): loads["master[2].f_ext"], ("f", 301): loads["point[1].f_ext"]}
+    problem = Problem(scene)
+    expected = problem.solve([0.0, END], {key: lambda t, v=np.array(value): v for key, value in inputs.items()})[-1]
+    tolerance = {"central-difference": 2e-1, "rk4": 2e-3}[method]
+    largest = np.abs(expected["x"] - problem.x0).max()
+    for k, i in enumerate(problem.ids):
+        name = f"master[{problem.masters.index(i) + 1}]" if i in problem.masters else "point[1]"
+        np.testing.assert_allclose(instance[f"{name}.r"], expected["x"][k], rtol=0, atol=tolerance * largest)
+    instance.fmu.terminate()
+    instance.fmu.freeInstance()
