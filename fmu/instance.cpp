@@ -23,7 +23,8 @@ int hexDigit(char c) {
 std::string percentDecoded(const std::string& text) {
   std::string out;
   for (std::size_t i = 0; i < text.size(); ++i) {
-    const bool escape = text[i] == '%' && i + 2 < text.size() && hexDigit(text[i + 1]) >= 0 && hexDigit(text[i + 2]) >= 0;
+    const bool escape =
+        text[i] == '%' && i + 2 < text.size() && hexDigit(text[i + 1]) >= 0 && hexDigit(text[i + 2]) >= 0;
     if (!escape) {
       out += text[i];
     } else {
@@ -248,7 +249,8 @@ void Instance::set(const fmi2ValueReference refs[], std::size_t count, const dou
 }
 
 void Instance::doStep(double point, double step) {
-  if (!(step > 0) || !std::isfinite(step)) throw Refused("the step size " + text(step) + " s is not above zero and finite");
+  if (!(step > 0) || !std::isfinite(step))
+    throw Refused("the step size " + text(step) + " s is not above zero and finite");
   const double allowed = tolerance(clock.time, step);
   if (!(std::abs(point - clock.time) <= allowed))
     throw Refused("the step starts at " + text(point) + " s, but the instance stands at " + text(clock.time) + " s");

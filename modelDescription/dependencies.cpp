@@ -1,0 +1,246 @@
+#include "dependencies.hpp"
+
+#include <algorithm>
+#include <numeric>
+
+#include "influences.hpp"
+
+namespace tiefmu {
+namespace {
+
+// Beyond these an unknown is taken to depend on everything: lists of that length help no importer.
+constexpr std::size_t mostEntriesPerRow = 5000;
+constexpr std::size_t mostEntriesPerClass = 1000000;  // unknowns of a class times their knowns
+
+Dependence kindOf(Pattern p, int bit) {
+  return p.moving >> bit & 1     ? Dependence::dependent
+         : p.changing >> bit & 1 ? Dependence::fixed
+                                 : Dependence::constant;
+}
+
+class Analysis {
+ public:
+  Analysis(const Model& m, const std::vector<Block>& table)
+      : model(m), blocks(table), layout(m), influences(m, layout, table), references(influences.references()) {}
+  Dependencies run();
+
+ private:
+  std::uint32_t root(std::uint32_t freedom);
+  void couple(const Influences::Pair& pair);
+  void numberClasses();
+  void findClasses();
+
+  void startRow();
+  void addDependency(std::uint32_t reference, Dependence kind);
+  void collect(const List& list, int component, Dependence least, bool acrossClasses);
+  void finishRow();
+  void rows(const Block& block);
+  void nodeRows(const Block& block);
+  void slaveRows(const Block& block);
+
+  const Model& model;
+  const std::vector<Block>& blocks;
+  const Layout layout;
+  const Influences influences;
+  const std::uint32_t references;
+
+  // Accelerations that a mass matrix couples form a class: they depend on the same knowns.
+  std::vector<std::uint32_t> parent;  // union-find over 6 freedoms of each free node
+  std::vector<Dependence> leastKind;  // per freedom: how its row of the mass matrix changes
+  std::vector<std::uint32_t> classOf, members, membersBegin;  // freedoms by class
+  std::vector<Dependency> knowns;                             // of class c: [knownsBegin[c], knownsBegin[c+1])
+  std::vector<std::size_t> knownsBegin;
+  std::vector<std::uint8_t> isDense;                          // its list is left out
+
+  Dependencies out;
+  std::vector<Dependency> row;  // being collected
+  bool rowIsAll = false;
+  std::uint32_t stamp = 0;
+  std::vector<std::uint32_t> stampOf, placeOf;  // per reference: last row that holds it, and where
+  std::vector<std::uint32_t> classStamp;        // per class: last row that holds it, and as what
+  std::vector<Dependence> classKind;
+};
+
+std::uint32_t Analysis::root(std::uint32_t freedom) {
+  while (parent[freedom] != freedom) freedom = parent[freedom] = parent[parent[freedom]];
+  return freedom;
+}
+
+// Freedoms of two free nodes that the mass matrix couples find their accelerations together.
+void Analysis::couple(const Influences::Pair& pair) {
+  const auto rowBase = 6 * static_cast<std::uint32_t>(pair.node - model.freeBegin());
+  const auto columnBase = 6 * static_cast<std::uint32_t>(pair.other - model.freeBegin());
+  const Pattern* block[2][2] = {{&pair.mass.vv, &pair.mass.vw}, {&pair.mass.wv, &pair.mass.ww}};
+  for (std::uint32_t i = 0; i < 6; ++i)
+    for (std::uint32_t j = 0; j < 6; ++j) {
+      const Pattern& p = *block[i / 3][j / 3];
+      const int bit = static_cast<int>(3 * (i % 3) + j % 3);
+      if (!(p.any >> bit & 1)) continue;
+      parent[root(rowBase + i)] = root(columnBase + j);
+      leastKind[rowBase + i] = std::max(leastKind[rowBase + i], kindOf(p, bit));
+    }
+}
+
+void Analysis::numberClasses() {
+  const auto freedoms = 6 * static_cast<std::uint32_t>(model.free());
+  parent.resize(freedoms);
+  std::iota(parent.begin(), parent.end(), 0u);
+  leastKind.assign(freedoms, Dependence::constant);
+  for (const Influences::Pair& pair : influences.coupled) couple(pair);
+  classOf.resize(freedoms);
+  std::uint32_t classes = 0;
+  for (std::uint32_t k = 0; k < freedoms; ++k)
+    if (root(k) == k) classOf[k] = classes++;
+  membersBegin.assign(classes + 1, 0);
+  for (std::uint32_t k = 0; k < freedoms; ++k) ++membersBegin[(classOf[k] = classOf[root(k)]) + 1];
+  std::partial_sum(membersBegin.begin(), membersBegin.end(), membersBegin.begin());
+  members.resize(freedoms);
+  std::vector<std::uint32_t> next = membersBegin;
+  for (std::uint32_t k = 0; k < freedoms; ++k) members[next[classOf[k]]++] = k;
+}
+
+// The knowns of every class: those of all loads on its freedoms.
+void Analysis::findClasses() {
+  numberClasses();
+  const std::size_t classes = membersBegin.size() - 1;
+  knownsBegin.assign(1, 0);
+  for (std::size_t c = 0; c < classes; ++c) {
+    const auto first = members.begin() + membersBegin[c], last = members.begin() + membersBegin[c + 1];
+    Dependence least = Dependence::constant;
+    for (auto k = first; k < last; ++k) least = std::max(least, leastKind[*k]);
+    startRow();
+    for (auto k = first; k < last; ++k) {
+      const int node = model.freeBegin() + static_cast<int>(*k / 6), component = static_cast<int>(*k % 3);
+      const bool turn = *k % 6 >= 3;
+      collect(turn ? influences.nodeMoment[node] : influences.nodeForce[node], component, least, false);
+      collect(turn ? influences.reactionMoment[node] : influences.reactionForce[node], component, least, false);
+      collect(turn ? influences.inertialMoment[node] : influences.inertialForce[node], component, least, false);
+    }
+    const auto unknowns = static_cast<std::size_t>(last - first);
+    isDense.push_back(row.size() > mostEntriesPerRow || row.size() * unknowns > mostEntriesPerClass);
+    if (!isDense.back()) knowns.insert(knowns.end(), row.begin(), row.end());
+    knownsBegin.push_back(knowns.size());
+  }
+  classStamp.assign(classes, 0);
+  classKind.resize(classes);
+}
+
+void Analysis::startRow() {
+  row.clear();
+  rowIsAll = false;
+  ++stamp;
+}
+
+void Analysis::addDependency(std::uint32_t reference, Dependence kind) {
+  if (stampOf[reference] != stamp) {
+    stampOf[reference] = stamp;
+    placeOf[reference] = static_cast<std::uint32_t>(row.size());
+    row.push_back({reference, kind});
+  } else {
+    Dependence& held = row[placeOf[reference]].kind;
+    held = std::max(held, kind);
+  }
+}
+
+// Adds one component of an unknown vector to the row. Accelerations of free nodes stand for the knowns of their class.
+void Analysis::collect(const List& list, int component, Dependence least, bool acrossClasses) {
+  for (const Entry& e : list)
+    for (int c = 0; c < 3; ++c) {
+      const int bit = 3 * component + c;
+      if (!(e.pattern.any >> bit & 1)) continue;
+      const Dependence kind = std::max(kindOf(e.pattern, bit), least);
+      const std::uint32_t reference = e.known + static_cast<std::uint32_t>(c);
+      if (reference < references) {
+        addDependency(reference, kind);
+      } else if (acrossClasses) {
+        const std::uint32_t k = classOf[reference - references];
+        if (classStamp[k] == stamp && classKind[k] >= kind) continue;
+        classStamp[k] = stamp;
+        classKind[k] = kind;
+        rowIsAll |= isDense[k] != 0;
+        for (std::size_t i = knownsBegin[k]; i < knownsBegin[k + 1]; ++i)
+          addDependency(knowns[i].reference, std::max(kind, knowns[i].kind));
+      }
+    }
+}
+
+void Analysis::finishRow() {
+  const bool all = rowIsAll || row.size() > mostEntriesPerRow;
+  if (!all) out.entries.insert(out.entries.end(), row.begin(), row.end());
+  out.all.push_back(all);
+  out.begin.push_back(out.entries.size());
+}
+
+void Analysis::nodeRows(const Block& block) {
+  const int first = static_cast<int>((block.place - layout[block.field].offset) / block.components);
+  const bool inertial = model.settings.reaction != Reaction::loads;
+  for (int e = 0; e < static_cast<int>(block.numbers.size()); ++e) {
+    const int node = first + e;
+    for (int k = 0; k < block.components; ++k) {
+      startRow();
+      const auto take = [&](const List& list) { collect(list, k, Dependence::constant, true); };
+      if (block.field == Field::addedMass) take(influences.addedMass[node]);
+      if (block.field == Field::addedInertia) take(influences.addedInertia[node]);
+      if (block.field == Field::reactionForce) {
+        take(influences.reactionForce[node]);
+        if (inertial) take(influences.inertialForce[node]);
+      }
+      if (block.field == Field::reactionMoment) {
+        take(influences.reactionMoment[node]);
+        if (inertial) take(influences.inertialMoment[node]);
+      }
+      finishRow();  // velocities and positions that are outputs are states, stiffnesses constants: empty rows
+    }
+  }
+}
+
+void Analysis::slaveRows(const Block& block) {
+  List v, w, x, a;
+  const std::size_t last = out.all.size() + block.count();
+  influences.eachSegment([&](const Segment& s) {
+    for (int slave = s.first; slave < s.last && out.all.size() < last; ++slave) {
+      for (List* list : {&v, &w, &x, &a}) list->clear();
+      if (block.field == Field::slaveAcceleration)
+        influences.acceleration(s, slave, a);
+      else
+        influences.motion(s, slave, v, w, x);
+      const List& list = block.field == Field::slaveVelocity   ? v
+                         : block.field == Field::slaveSpin     ? w
+                         : block.field == Field::slavePosition ? x
+                                                               : a;
+      for (int k = 0; k < block.components; ++k) {
+        startRow();
+        collect(list, k, Dependence::constant, true);
+        finishRow();
+      }
+    }
+  });
+}
+
+void Analysis::rows(const Block& block) {
+  const bool unknown = block.causality == Causality::output || block.causality == Causality::calculatedParameter;
+  if (unknown && block.prefix == "slave") return slaveRows(block);
+  if (unknown && !block.prefix.empty()) return nodeRows(block);
+  for (std::size_t i = 0; i < block.count(); ++i) {
+    startRow();
+    rowIsAll = unknown && block.field != Field::drift;  // sums over the whole model; offsets are states
+    finishRow();
+  }
+}
+
+Dependencies Analysis::run() {
+  stampOf.assign(references, 0);
+  placeOf.resize(references);
+  out.begin.push_back(0);
+  findClasses();
+  for (const Block& b : blocks) rows(b);
+  return std::move(out);
+}
+
+}  // namespace
+
+Dependencies dependencies(const Model& model, const std::vector<Block>& blocks) {
+  return Analysis(model, blocks).run();
+}
+
+}  // namespace tiefmu

@@ -1,0 +1,310 @@
+#include "influences.hpp"
+
+namespace tiefmu {
+
+Influences::Influences(const Model& m, const Layout& l, const std::vector<Block>& blocks)
+    : nodeForce(m.nodes()),
+      nodeMoment(m.nodes()),
+      reactionForce(m.nodes()),
+      reactionMoment(m.nodes()),
+      inertialForce(m.nodes()),
+      inertialMoment(m.nodes()),
+      addedMass(m.nodes()),
+      addedInertia(m.nodes()),
+      model(m),
+      layout(l),
+      referenceAt(l.size, noReference) {
+  for (const Block& b : blocks) {
+    references_ = b.reference + static_cast<std::uint32_t>(b.count());
+    if (b.causality != Causality::input && b.causality != Causality::parameter) continue;
+    for (std::size_t i = 0; i < b.count(); ++i)
+      referenceAt[b.place + i] = b.reference + static_cast<std::uint32_t>(i);
+    shapesChange |= b.field == Field::position && model.finite();
+  }
+  findSprings();
+  findReactions();
+  findAdditions();
+  findInertialLoads();
+}
+
+Segment Influences::segment(const TieGroup& g, int e) const {
+  Segment s{g, &g.node[static_cast<std::size_t>(g.corners) * e], g.firstSlave + g.begin[e],
+            g.firstSlave + g.begin[e + 1], Mat3::Zero(), {}};
+  if (g.coupling != Coupling::meanMotion || model.finite()) return s;
+  Vec3 centre = Vec3::Zero();
+  for (int i = 0; i < g.corners; ++i) centre += at(model.nodePosition.data(), s.node[i]) / g.corners;
+  Mat3 ibar = Mat3::Zero();
+  for (int i = 0; i < g.corners; ++i) {
+    s.arm[i] = at(model.nodePosition.data(), s.node[i]) - centre;
+    ibar += s.arm[i].squaredNorm() * Mat3::Identity() - s.arm[i] * s.arm[i].transpose();
+  }
+  s.inverse = ibar.inverse();
+  return s;
+}
+
+void Influences::corners(const Segment& s, int slave, CornerMap maps[4]) const {
+  const Vec3 d = at(model.slaveOffset.data(), slave);
+  for (int i = 0; i < s.group.corners; ++i) {
+    CornerMap map;
+    if (s.group.coupling == Coupling::meanMotion) {
+      map.wv = model.finite() ? moving(fullPattern) : patternOf(s.inverse * skew(s.arm[i]));
+      if (!hasOffset(slave))
+        map.vv = identityPattern;
+      else if (model.finite())
+        map.vv = moving(fullPattern);
+      else
+        map.vv = patternOf(Mat3::Identity() / s.group.corners - skew(d) * s.inverse * skew(s.arm[i]));
+    } else if (weight(s, slave, i) != 0) {
+      map.vv = identityPattern;
+      if (s.group.coupling == Coupling::rotation) {
+        map.ww = identityPattern;
+        if (hasOffset(slave)) map.vw = model.finite() ? moving(crossPattern) : patternOf(-skew(d));
+      }
+    }
+    maps[i] = map;
+  }
+}
+
+// Velocity, angular velocity and position of a slave.
+void Influences::motion(const Segment& s, int slave, List& v, List& w, List& x) const {
+  CornerMap maps[4];
+  corners(s, slave, maps);
+  const bool mean = s.group.coupling == Coupling::meanMotion;
+  for (int i = 0; i < s.group.corners; ++i) {
+    const int node = s.node[i];
+    add(v, maps[i].vv, known(Field::velocity, node));
+    add(v, maps[i].vw, known(Field::spin, node));
+    add(w, maps[i].wv, known(Field::velocity, node));
+    add(w, maps[i].ww, known(Field::spin, node));
+    const std::uint32_t position = known(Field::position, node);
+    add(x, mean && model.finite() ? identityPattern : maps[i].vv, position);
+    if (mean && shapesChange) {
+      if (hasOffset(slave)) add(v, moving(fullPattern), position);
+      add(w, moving(fullPattern), position);
+    }
+  }
+}
+
+// How b of a slave (THEORY 2) depends on one corner: its translational part on v and w, its rotational part on v.
+Influences::Bias Influences::bias(const Segment& s, int slave, int corner) const {
+  Bias b;
+  if (!model.finite()) return b;
+  if (s.group.coupling == Coupling::meanMotion) {
+    if (hasOffset(slave)) b.onV = moving(fullPattern);
+    b.onZ = moving(fullPattern);
+  } else if (s.group.coupling == Coupling::rotation && hasOffset(slave) && weight(s, slave, corner) != 0) {
+    b.onW = moving(fullPattern);
+  }
+  return b;
+}
+
+// T q'' + b
+void Influences::acceleration(const Segment& s, int slave, List& a) const {
+  CornerMap maps[4];
+  corners(s, slave, maps);
+  for (int i = 0; i < s.group.corners; ++i) {
+    const int node = s.node[i];
+    add(a, maps[i].vv, acceleration(node));
+    add(a, maps[i].vw, angularAcceleration(node));
+    const Bias b = bias(s, slave, i);
+    add(a, b.onV, known(Field::velocity, node));
+    add(a, b.onW, known(Field::spin, node));
+    if (s.group.coupling == Coupling::meanMotion && shapesChange && hasOffset(slave))
+      add(a, moving(fullPattern), known(Field::position, node));
+  }
+}
+
+void Influences::findSprings() {
+  sprung.assign(static_cast<std::size_t>(model.slaves()), -1);
+  int count = 0;
+  for (const Spring& spring : model.springs)
+    for (const SpringEnd* end : {&spring.a, &spring.b})
+      if (end->slave >= 0 && sprung[end->slave] < 0) sprung[end->slave] = count++;
+  std::vector<List> v(count), w(count), x(count);
+  eachSegment([&](const Segment& s) {
+    for (int slave = s.first; slave < s.last; ++slave)
+      if (const int k = sprung[slave]; k >= 0) motion(s, slave, v[k], w[k], x[k]);
+  });
+  slaveForce.resize(count);
+  slaveMoment.resize(count);
+  for (const Spring& spring : model.springs) addSpring(spring, v, w, x);
+  for (int node = model.freeBegin(); node < model.freeEnd(); ++node) {
+    add(nodeForce[node], identityPattern, known(Field::nodeForce, node));
+    add(nodeMoment[node], identityPattern, known(Field::nodeMoment, node));
+  }
+}
+
+void Influences::addSpring(const Spring& spring, const std::vector<List>& v, const std::vector<List>& w,
+                         const std::vector<List>& x) {
+  struct Load { List force, moment; } a, b;
+  const Pattern cross = moving(crossPattern), full = moving(fullPattern);
+  const Pattern stiff = diagonalPattern(spring.stiffness), damped = diagonalPattern(spring.damping);
+  const Pattern twisted = diagonalPattern(spring.rotationalDamping);
+  const bool axial = spring.kind == SpringKind::axial;
+  const bool bTurns = spring.b.slave >= 0 ? spring.b.slave < model.turning()
+                                          : spring.b.node >= 0 && spring.b.node < model.rotating();
+  for (const SpringEnd* end : {&spring.a, &spring.b}) {
+    List ev, ew, ex;
+    if (end->slave >= 0) {
+      const int k = sprung[end->slave];
+      ev = v[k], ew = w[k], ex = x[k];
+    } else if (end->node >= 0) {
+      add(ev, identityPattern, known(Field::velocity, end->node));
+      add(ew, identityPattern, known(Field::spin, end->node));
+      add(ex, identityPattern, known(Field::position, end->node));
+    }
+    List force;  // on either end
+    if (axial) {
+      if (spring.stiffness[0] != 0 || spring.damping[0] != 0) add(force, full, ex);
+      if (spring.damping[0] != 0) add(force, full, ev);
+    } else {  // K (line - R_b arm) + C (rate of line - w_b x line)
+      add(force, stiff, ex);
+      if (bTurns) add(force, damped * cross, ex);
+      add(force, damped, ev);
+      if (end == &spring.b) add(force, damped * cross, ew);
+      add(a.moment, twisted, ew);
+      add(b.moment, twisted, ew);
+      add(b.moment, cross, force);  // the shear force over the distance
+      if (!stiff.empty() || !damped.empty()) add(b.moment, cross, ex);
+    }
+    add(a.force, identityPattern, force);
+    add(b.force, identityPattern, force);
+  }
+  const auto apply = [&](const SpringEnd& end, const Load& load) {
+    if (end.slave >= 0) {
+      add(slaveForce[sprung[end.slave]], identityPattern, load.force);
+      if (end.slave < model.turning()) add(slaveMoment[sprung[end.slave]], identityPattern, load.moment);
+    } else if (end.node >= 0) {
+      add(nodeForce[end.node], identityPattern, load.force);
+      if (end.node < model.rotating()) add(nodeMoment[end.node], identityPattern, load.moment);
+    }
+  };
+  apply(spring.a, a);
+  apply(spring.b, b);
+}
+
+// T^T f_s (THEORY 3)
+void Influences::findReactions() {
+  List force, moment;
+  CornerMap maps[4];
+  const Pattern weightOf = diagonalPattern(model.settings.gravity) * scalarPattern;
+  eachSegment([&](const Segment& s) {
+    for (int slave = s.first; slave < s.last; ++slave) {
+      force.clear();
+      moment.clear();
+      add(force, weightOf, known(Field::slaveMass, slave, 1));
+      add(force, identityPattern, known(Field::slaveForce, slave));
+      add(moment, identityPattern, known(Field::slaveMoment, slave));
+      if (const int k = sprung[slave]; k >= 0) {
+        add(force, identityPattern, slaveForce[k]);
+        add(moment, identityPattern, slaveMoment[k]);
+      }
+      corners(s, slave, maps);
+      for (int i = 0; i < s.group.corners; ++i) {
+        const CornerMap& map = maps[i];
+        add(reactionForce[s.node[i]], transposed(map.vv), force);
+        add(reactionForce[s.node[i]], transposed(map.wv), moment);
+        add(reactionMoment[s.node[i]], transposed(map.vw), force);
+        add(reactionMoment[s.node[i]], transposed(map.ww), moment);
+      }
+    }
+    if (s.group.coupling == Coupling::meanMotion && shapesChange)
+      for (int i = 0; i < s.group.corners; ++i)
+        for (int j = 0; j < s.group.corners; ++j)
+          add(reactionForce[s.node[i]], moving(fullPattern), known(Field::position, s.node[j]));
+  });
+}
+
+// D_i of the parameters (THEORY 4, lumped)
+void Influences::findAdditions() {
+  eachSegment([&](const Segment& s) {
+    for (int slave = s.first; slave < s.last; ++slave) {
+      const std::uint32_t m = known(Field::slaveMass, slave, 1), own = known(Field::slaveInertia, slave, 1);
+      for (int i = 0; i < s.group.corners; ++i) {
+        const std::size_t at = static_cast<std::size_t>(slave - s.group.firstSlave) * s.group.corners + i;
+        const bool mean = s.group.coupling == Coupling::meanMotion;
+        if (!mean && s.group.clamped[at] == 0) continue;
+        add(addedMass[s.node[i]], scalarPattern, m);
+        if (mean) add(addedMass[s.node[i]], scalarPattern, own);
+        if (s.group.coupling == Coupling::rotation) {
+          if (hasOffset(slave)) add(addedInertia[s.node[i]], scalarPattern, m);
+          add(addedInertia[s.node[i]], scalarPattern, own);
+        }
+      }
+    }
+  });
+}
+
+void Influences::findInertialLoads() {
+  if (model.settings.inertia == Inertia::consistent) {
+    eachSegment([&](const Segment& s) { addInertialLoads(s); });
+    return;
+  }
+  for (int node = 0; node < model.nodes(); ++node) {
+    const bool changes = !addedMass[node].empty(), turnChanges = !addedInertia[node].empty();
+    add(inertialForce[node], changes ? changing(identityPattern) : identityPattern, acceleration(node));
+    add(inertialMoment[node], turnChanges ? changing(identityPattern) : identityPattern, angularAcceleration(node));
+    add(inertialForce[node], moving(identityPattern), addedMass[node]);
+    add(inertialMoment[node], moving(identityPattern), addedInertia[node]);
+    if (!isFree(node)) continue;
+    CornerMap mass;
+    mass.vv = changes ? changing(identityPattern) : identityPattern;
+    mass.ww = turnChanges ? changing(identityPattern) : identityPattern;
+    coupled.push_back({node, node, mass});
+  }
+}
+
+// T^T M_s (T q'' + b) of the slaves on one segment (THEORY 4, consistent)
+void Influences::addInertialLoads(const Segment& s) {
+  const int n = s.group.corners;
+  CornerMap maps[4], mass[4][4] = {};
+  struct BiasLoad { Pattern forceV, forceW, momentV, momentW; } biases[4][4] = {};
+  for (int slave = s.first; slave < s.last; ++slave) {
+    const std::uint32_t massParameter = known(Field::slaveMass, slave, 1);
+    const std::uint32_t inertiaParameter = known(Field::slaveInertia, slave, 1);
+    Pattern m, own;
+    if (massParameter != noReference) m = changing(identityPattern);
+    else if (model.slaveMass[slave] != 0) m = identityPattern;
+    if (inertiaParameter != noReference) own = changing(identityPattern);
+    else if (slave < model.turning() && model.slaveInertia[slave] != 0) own = identityPattern;
+    if (m.empty() && own.empty()) continue;
+    corners(s, slave, maps);
+    for (int i = 0; i < n; ++i) {
+      const Pattern vv = transposed(maps[i].vv) * m, vw = transposed(maps[i].vw) * m;
+      const Pattern wv = transposed(maps[i].wv) * own, ww = transposed(maps[i].ww) * own;
+      for (int j = 0; j < n; ++j) {
+        mass[i][j].vv = mass[i][j].vv + vv * maps[j].vv + wv * maps[j].wv;
+        mass[i][j].vw = mass[i][j].vw + vv * maps[j].vw + wv * maps[j].ww;
+        mass[i][j].wv = mass[i][j].wv + vw * maps[j].vv + ww * maps[j].wv;
+        mass[i][j].ww = mass[i][j].ww + vw * maps[j].vw + ww * maps[j].ww;
+        const auto [onV, onW, onZ] = bias(s, slave, j);
+        biases[i][j].forceV = biases[i][j].forceV + vv * onV + wv * onZ;
+        biases[i][j].forceW = biases[i][j].forceW + vv * onW;
+        biases[i][j].momentV = biases[i][j].momentV + vw * onV + ww * onZ;
+        biases[i][j].momentW = biases[i][j].momentW + vw * onW;
+      }
+      const Pattern any = moving(scalarPattern);
+      if (!vv.empty()) add(inertialForce[s.node[i]], any, massParameter);
+      if (!vw.empty()) add(inertialMoment[s.node[i]], any, massParameter);
+      if (!wv.empty()) add(inertialForce[s.node[i]], any, inertiaParameter);
+      if (!ww.empty()) add(inertialMoment[s.node[i]], any, inertiaParameter);
+    }
+  }
+  for (int i = 0; i < n; ++i)
+    for (int j = 0; j < n; ++j) {
+      const int node = s.node[i], other = s.node[j];
+      List& force = inertialForce[node];
+      List& moment = inertialMoment[node];
+      add(force, mass[i][j].vv, acceleration(other));
+      add(force, mass[i][j].vw, angularAcceleration(other));
+      add(moment, mass[i][j].wv, acceleration(other));
+      add(moment, mass[i][j].ww, angularAcceleration(other));
+      add(force, biases[i][j].forceV, known(Field::velocity, other));
+      add(force, biases[i][j].forceW, known(Field::spin, other));
+      add(moment, biases[i][j].momentV, known(Field::velocity, other));
+      add(moment, biases[i][j].momentW, known(Field::spin, other));
+      if (isFree(node) && isFree(other)) coupled.push_back({node, other, mass[i][j]});
+    }
+}
+
+}  // namespace tiefmu
