@@ -120,12 +120,8 @@ NodeInertia nodeInertia(int n, const Vec3* corner) {
     const Vec3 r = corner[i] - result.centre;
     result.ibar += r.squaredNorm() * Mat3::Identity() - r * r.transpose();
   }
-  // The eigenvalues of Ibar are sums of two eigenvalues of sum r r^T = R^T R; through the singular values of R a
-  // needle's small one is exact where the difference of squares would lose it.
-  Eigen::Matrix<double, 4, 3> arms = Eigen::Matrix<double, 4, 3>::Zero();
-  for (int i = 0; i < n; ++i) arms.row(i) = (corner[i] - result.centre).transpose();
-  const Vec3 s2 = Eigen::JacobiSVD<Eigen::Matrix<double, 4, 3>>(arms).singularValues().cwiseAbs2();
-  const double smallest = s2(1) + s2(2), largest = s2(0) + s2(1);
+  const Vec3 eigenvalues = Eigen::SelfAdjointEigenSolver<Mat3>(result.ibar, Eigen::EigenvaluesOnly).eigenvalues();
+  const double smallest = eigenvalues(0), largest = eigenvalues(2);
   const double infinity = std::numeric_limits<double>::infinity();
   result.lambda = smallest > 0 ? 1 / smallest : infinity;
   result.condition = smallest > 0 ? largest / smallest : infinity;

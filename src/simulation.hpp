@@ -7,42 +7,9 @@
 #include <string>
 #include <vector>
 
-#include "model.hpp"
+#include "layout.hpp"
 
 namespace tiefmu {
-
-// Fields of the array, 3 doubles an entry for vectors. n: all nodes; r: rotating nodes; s: slaves; u: turning slaves.
-enum class Field : int {
-  // parameters
-  timeStep, safety, slaveMass /*s*/, slaveInertia /*u*/,
-  // computed from the parameters at the end of initialisation
-  addedMass /*n*/, addedInertia /*r*/, stiffness /*n*/, rotationalStiffness /*r*/,
-  // inputs
-  nodeForce /*3n*/, nodeMoment /*3r*/, slaveForce /*3s*/, slaveMoment /*3u*/,
-  // motion: inputs where a node is driven, states or results where it is free, zero where it is fixed
-  acceleration /*3n*/, angularAcceleration /*3r*/, velocity /*3n*/, spin /*3r*/, position /*3n*/,
-  // further states
-  offset /*3u: d now*/, segmentRotation /*4 per meanMotion segment*/, orientation /*4 per Model::oriented*/,
-  work /*external, dissipated*/, lagged /*velocity, spin that the last forces used*/,
-  predicted /*velocity, spin that the last bias used*/, mode /*of the highest frequency*/, driven /*kinetic energy carried*/,
-  // outputs
-  slaveVelocity /*3s*/, slaveSpin /*3u*/, reactionForce /*3n*/, reactionMoment /*3r*/,
-  slavePosition /*3s*/, slaveAcceleration /*3s*/,
-  energy /*kinetic, strain, dissipated, external, residual*/, powerResidual, drift, stableTimeStep, nodalTimeStep,
-  count
-};
-
-struct Slice {
-  std::size_t offset = 0, count = 0;  // in doubles; count 0: this model has no such field
-};
-
-// Where each field of a model stands in the array.
-struct Layout {
-  explicit Layout(const Model& model);
-  Slice operator[](Field f) const { return slices[static_cast<int>(f)]; }
-  std::size_t size = 0;
-  std::array<Slice, static_cast<int>(Field::count)> slices{};
-};
 
 // A step ended in a non-finite or runaway number; the state before the step has been put back.
 struct Diverged : std::runtime_error {

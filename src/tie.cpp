@@ -9,7 +9,6 @@
 #define TIEFMU_CLONES
 #endif
 #define TIEFMU_INLINE inline __attribute__((always_inline))
-#pragma GCC diagnostic ignored "-Wpsabi"  // packs never cross a call that is not inlined
 
 namespace tiefmu {
 namespace {

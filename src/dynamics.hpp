@@ -1,0 +1,99 @@
+// The equations of motion of one simulation: geometry, forces, accelerations, and what moves them on.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "inertia.hpp"
+#include "layout.hpp"
+#include "spring.hpp"
+#include "tie.hpp"
+
+namespace tiefmu {
+
+// Works on the array `data` laid out by `layout`; holds only scratch beside it, so that a copy of the array is the
+// whole state. No function but the constructor and `prepare` allocates.
+class Dynamics {
+ public:
+  Dynamics(const Model& model, const Layout& layout, double* data);
+
+  const Model& model;
+  const Layout& layout;
+  double* data;
+  double* field(Field f) { return data + layout[f].offset; }
+  bool has(Field f) const { return layout[f].count > 0; }
+
+  void setStart();      // every field to its start value
+  void prepare();       // from the parameters: added inertia, stiffness, then prepareMass. Throws SceneError
+  void prepareMass();   // what stands beside the array: geometry and mass matrix. Throws SceneError
+  void updateGeometry();
+
+  // Loads at the present geometry with `lagged` velocities in the dampers: T^T f_s into the reactions, then the free
+  // nodes' accelerations, with `predicted` velocities in the bias.
+  void evaluate();
+  void evaluateReactions();  // T^T f_s only
+  // Sets `lagged` and `predicted`, where this model has them, from velocity and spin, plus ahead * acceleration for
+  // the second and, if `both`, for the first.
+  void setForceVelocities(double ahead, bool both);
+  void takeDrivenVelocities();  // the driven part of the same, after inputs have changed
+
+  // v += h a over the free nodes.
+  void kick(double h);
+  // Positions and rotations over h with velocity + ahead * acceleration (free nodes), then the geometry.
+  void drift(double h, double ahead);
+  // d/dt of the fields velocity .. work at the present state, for a Runge-Kutta stage. `rates` starts at velocity.
+  void rates(double* rates);
+  void normalise();  // offsets and rotations back to their length after a Runge-Kutta step
+
+  // Outputs at the present state. `evaluate` (or evaluateReactions) must be up to date.
+  void updateOutputs();
+  // Power into the system from loads, gravity and driven nodes, and that lost in dampers, W.
+  struct Power { double external, dissipated; };
+  Power power();
+  double kineticEnergy();
+  double strainEnergy() const { return strain_; }
+
+  // Restoring loads K u (or damping C u) of the springs for a motion of the free nodes: u 3 per node, turn 3 per
+  // rotating node, zero where not free; f, t likewise.
+  void springOperator(const double* u, const double* turn, double* f, double* t, bool damping);
+  // M^-1 of the free nodes, in place on node arrays.
+  void solveInertia(double* f, double* t);
+
+  std::int64_t evaluations = 0;
+
+ private:
+  struct Sprung { int group; SegmentRange range; };
+  TieGeometry geometry(std::size_t g) const;
+  template <class Body> void eachGroup(Body body) const;   // body(group, all its segments, geometry, index)
+  template <class Body> void eachSprung(Body body) const;  // the same for runs of segments whose slaves hold springs
+  void placeSlaves(double* xs, bool sprungOnly);
+  EndMotion motion(const SpringEnd& end, const Spring& spring, const double* v, const double* w) const;
+  const double* quaternion(int index) const;
+  void gatherLoads();
+  void distributeLoads(const double* force, const double* moment, double* f, double* t);
+  void slaveAccelerations(const double* a, const double* z, const double* v, const double* w);
+  void inertialLoads();
+  void updateInertia();
+  const double* velocityFor(Field f) { return has(f) ? field(f) : field(Field::velocity); }
+  const double* spinFor(Field f) { return has(f) ? field(f) + 3 * model.nodes() : field(Field::spin); }
+
+  std::vector<SegmentFrame> frames_;
+  std::vector<std::size_t> firstFrame_;           // per group
+  std::vector<double> inverseLength2_;            // per turning slave: 1/d0^2
+  std::vector<Sprung> sprung_;                    // segments whose slaves hold springs
+  std::vector<double> load_, moment_;             // f_s where it is more than the inputs
+  std::vector<double> nodeLoad_, nodeMoment_;     // on nodes from springs, inputs and gravity
+  std::vector<double> xs_, vs_, ws_;              // slaves, for springs
+  std::vector<double> tangent_, tangentMoment_;   // on slaves, from springOperator
+  std::vector<double> as_, zs_;                   // slaves' accelerations, or the loads of their inertia
+  std::vector<double> right_, rightMoment_;       // right side of the mass matrix
+  std::vector<double> step_, stepSpin_;           // velocities of a drift
+  std::vector<double> displacement_;              // small geometry: x - X
+  const double* slaveLoad_ = nullptr;
+  const double* slaveMoment_ = nullptr;
+  double strain_ = 0, dissipation_ = 0;
+  bool gravity_ = false, offsetsTurn_ = false, bias_ = false, knownAccelerations_ = false, drivenMove_ = true;
+  std::unique_ptr<ConsistentInertia> inertia_;
+};
+
+}  // namespace tiefmu

@@ -1,0 +1,86 @@
+#include "integrator.hpp"
+
+#include <algorithm>
+
+namespace tiefmu {
+
+Integrator::Integrator(Dynamics& dynamics) : dynamics_(dynamics) {
+  const Layout& layout = dynamics.layout;
+  if (dynamics.model.settings.method == Method::rk4) {
+    start_.resize(layout[Field::lagged].offset - layout[Field::velocity].offset);
+    rates_.resize(start_.size());
+    sum_.resize(start_.size());
+  }
+  if (dynamics.model.settings.method == Method::nohBathe)
+    earlier_.resize(layout[Field::acceleration].count + layout[Field::angularAcceleration].count);
+}
+
+bool Integrator::step(double h) {
+  Dynamics& d = dynamics_;
+  switch (d.model.settings.method) {
+    case Method::centralDifference:
+      // Half kick, drift, half kick. Dampers see the half-step velocity; the bias, which is quadratic in it, sees it
+      // extrapolated to the end of the step, without which the order would drop to one.
+      d.kick(0.5 * h);
+      d.drift(h, 0);
+      d.setForceVelocities(0.5 * h, false);
+      d.evaluate();
+      d.kick(0.5 * h);
+      return true;
+    case Method::symplecticEuler:
+      d.kick(h);
+      d.drift(h, 0);
+      d.setForceVelocities(0, true);
+      return false;
+    case Method::nohBathe: {
+      const double h1 = nohBathe::p * h, h2 = (1 - nohBathe::p) * h;
+      double* a = d.field(Field::acceleration);  // angular accelerations follow
+      d.drift(h1, 0.5 * h1);
+      d.setForceVelocities(h1, true);
+      d.kick(0.5 * h1);
+      std::copy_n(a, earlier_.size(), earlier_.begin());
+      d.evaluate();
+      d.kick(0.5 * h1);
+      d.drift(h2, 0.5 * h2);
+      d.setForceVelocities(h2, true);
+      // v += h2 (q0 a_0 + (1/2 + q1) a_1 + q2 a_2)
+      d.kick((0.5 + nohBathe::q1) * h2);
+      std::swap_ranges(earlier_.begin(), earlier_.end(), a);
+      d.kick(nohBathe::q0 * h2);
+      std::swap_ranges(earlier_.begin(), earlier_.end(), a);  // a_1 as the guess of an iterative solution
+      d.evaluate();
+      d.kick(nohBathe::q2 * h2);
+      return true;
+    }
+    case Method::rk4:
+      rungeKutta(h);
+      return false;
+  }
+  return false;
+}
+
+void Integrator::rungeKutta(double h) {
+  Dynamics& d = dynamics_;
+  double* y = d.field(Field::velocity);
+  const std::size_t size = start_.size();
+  std::copy_n(y, size, start_.begin());
+  static constexpr double ahead[] = {0.5, 0.5, 1}, weight[] = {1, 2, 2, 1};
+  for (int stage = 0; stage < 4; ++stage) {
+    if (stage > 0) {
+      for (std::size_t k = 0; k < size; ++k) y[k] = start_[k] + ahead[stage - 1] * h * rates_[k];
+      d.updateGeometry();
+      d.setForceVelocities(0, true);
+      d.evaluate();
+    }
+    d.rates(rates_.data());
+    if (stage == 0) std::copy(rates_.begin(), rates_.end(), sum_.begin());
+    else
+      for (std::size_t k = 0; k < size; ++k) sum_[k] += weight[stage] * rates_[k];
+  }
+  for (std::size_t k = 0; k < size; ++k) y[k] = start_[k] + h / 6 * sum_[k];
+  d.normalise();
+  d.updateGeometry();
+  d.setForceVelocities(0, true);
+}
+
+}  // namespace tiefmu

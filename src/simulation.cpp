@@ -1,0 +1,310 @@
+#include "simulation.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "dynamics.hpp"
+#include "integrator.hpp"
+#include "stability.hpp"
+
+namespace tiefmu {
+namespace {
+
+constexpr double runaway = 3e8;         // m/s, rad/s: no explicit solution that is still one gets there
+constexpr int refreshEvery = 100;       // substeps between two looks at the highest frequency
+constexpr int checkEvery = 16;          // substeps between two looks for divergence
+constexpr double maxSubsteps = 1e9;
+constexpr double none = 1e30;
+
+enum Flag : std::uint32_t { accelerationsValid = 1, energyStarted = 2, initialised = 4 };
+
+}  // namespace
+
+struct Simulation::Impl {
+  std::shared_ptr<const Model> model;
+  Layout layout;
+  std::vector<double> data;
+  Dynamics dynamics;
+  Integrator integrator;
+  Spectrum spectrum;
+  std::vector<double> backup;  // of what a step changes: the fields acceleration .. bounds
+  double time = 0;
+  std::int64_t substeps = 0;
+  std::uint32_t flags = 0;
+  bool dampers = false, energy = false, integrates = false;
+  // Derived from `data`, never saved: geometry, gathered loads and outputs behind the inputs.
+  bool geometryOld = true, loadsOld = true, outputsOld = true, parametersOld = true;
+  bool prepared = false;
+
+  explicit Impl(std::shared_ptr<const Model> m)
+      : model(std::move(m)), layout(*model), data(layout.size), dynamics(*model, layout, data.data()),
+        integrator(dynamics), spectrum(dynamics) {
+    dampers = layout[Field::lagged].count > 0;
+    energy = layout[Field::energy].count > 0;
+    for (Field f : {Field::position, Field::segmentRotation, Field::orientation, Field::angle})
+      integrates |= layout[f].count > 0;
+    if (model->anyFree()) backup.resize(layout[Field::slaveVelocity].offset - layout[Field::acceleration].offset);
+    for (int s = 0; s < 3 * model->turning(); ++s) integrates |= model->finite() && model->slaveOffset[s] != 0;
+  }
+
+  double* field(Field f) { return data.data() + layout[f].offset; }
+
+  double methodLimit() {
+    const double* bounds = field(Field::bounds);
+    return stableStep(model->settings.method, bounds[0], bounds[1]);
+  }
+  double stepLimit() {
+    const double limit = *field(Field::safety) * methodLimit();
+    const double asked = *field(Field::timeStep);
+    return asked > 0 ? std::min(asked, limit) : limit;
+  }
+
+  void findLimits() {
+    double* bounds = field(Field::bounds);
+    bounds[0] = bounds[1] = 0;
+    *field(Field::nodalTimeStep) = nodalStep(*model, field(Field::addedMass), field(Field::addedInertia),
+                                             field(Field::stiffness), field(Field::rotationalStiffness));
+    if (model->anyFree() && !model->springs.empty()) {
+      bounds[0] = std::sqrt(spectrum.largest(false, layout[Field::mode].count ? field(Field::mode) : nullptr).bound());
+      if (dampers) bounds[1] = spectrum.largest(true, nullptr).bound();
+    }
+    *field(Field::stableTimeStep) = bounds[0] > 0 ? 2 / bounds[0] : none;
+  }
+
+  // Geometry changes the limit; the mode of the last look is where the next one starts.
+  void refreshLimits() {
+    if (layout[Field::mode].count == 0) return;
+    const Spectrum::Value value = spectrum.refresh(field(Field::mode));
+    if (value.ritz > 0 && std::isfinite(value.bound())) {
+      *field(Field::bounds) = std::sqrt(value.bound());
+      *field(Field::stableTimeStep) = 2 / *field(Field::bounds);
+    }
+  }
+
+  void bringGeometry() {
+    if (!geometryOld) return;
+    dynamics.updateGeometry();
+    geometryOld = false;
+  }
+
+  void evaluate() {
+    bringGeometry();
+    if (model->anyFree() && !(flags & accelerationsValid)) {
+      dynamics.evaluate();
+      flags |= accelerationsValid;
+    } else if (loadsOld) {
+      dynamics.evaluateReactions();
+    }
+    loadsOld = false;
+  }
+
+  double totalEnergy() { return dynamics.kineticEnergy() + dynamics.strainEnergy(); }
+
+  // In `loads` the host carries the inertia it accelerates: what a new input velocity adds is its work.
+  void startEnergy() {
+    double* work = field(Field::work);
+    const double total = totalEnergy();
+    if (!(flags & energyStarted)) {
+      work[2] = total;
+      flags |= energyStarted;
+    } else if (model->settings.reaction == Reaction::loads && model->anyDriven()) {
+      work[0] += total - work[3];
+    }
+    work[3] = total;
+  }
+
+  void checkFinite() {
+    if (!model->anyFree()) return;
+    for (Field f : {Field::velocity, Field::spin}) {
+      const double* v = field(f);
+      const int last = f == Field::velocity ? model->freeEnd() : model->rotating();
+      for (int i = model->freeBegin(); i < last; ++i)
+        for (int k = 0; k < 3; ++k) {
+          if (std::abs(v[3 * i + k]) < runaway) continue;  // false for NaN
+          char text[200];
+          std::snprintf(text, sizeof text, "diverged at t = %.9g s: %s of node %lld is %.3g %s; limit of the time step %.3g s",
+                        time, f == Field::velocity ? "velocity" : "angular velocity",
+                        static_cast<long long>(model->nodeId[i]), v[3 * i + k],
+                        f == Field::velocity ? "m/s" : "rad/s", methodLimit());
+          throw Diverged(text);
+        }
+    }
+  }
+
+  void integrate(double duration) {
+    const double end = time + duration;
+    double left = duration;
+    evaluate();
+    if (energy) startEnergy();
+    Dynamics::Power before{};
+    if (energy) before = dynamics.power();
+    while (left > 0) {
+      // Equal substeps; planned anew only when the limit has fallen below them.
+      double limit = stepLimit();
+      const double count = std::max(1.0, std::ceil(left / limit * (1 - 1e-12)));
+      if (!(count <= maxSubsteps)) {
+        char text[160];
+        std::snprintf(text, sizeof text, "a step of %.6g s would take %.3g substeps of at most %.3g s", duration, count, limit);
+        throw Diverged(text);
+      }
+      const std::int64_t n = static_cast<std::int64_t>(count);
+      const double h = left / count;
+      std::int64_t done = 0;
+      while (done < n) {
+        if (!(flags & accelerationsValid)) {
+          dynamics.evaluate();
+          flags |= accelerationsValid;
+        }
+        if (!integrator.step(h)) flags &= ~accelerationsValid;
+        ++done;
+        ++substeps;
+        if (energy) {
+          evaluate();
+          const Dynamics::Power after = dynamics.power();
+          if (model->settings.method != Method::rk4) {  // which integrates them with the rest
+            field(Field::work)[0] += 0.5 * h * (before.external + after.external);
+            field(Field::work)[1] += 0.5 * h * (before.dissipated + after.dissipated);
+          }
+          before = after;
+        }
+        if (substeps % checkEvery == 0) checkFinite();
+        if (substeps % refreshEvery == 0) {
+          refreshLimits();
+          if (stepLimit() < h * (1 - 1e-9)) break;
+        }
+      }
+      left = done < n ? left - static_cast<double>(done) * h : 0;
+    }
+    time = end;
+    checkFinite();
+    if (energy) field(Field::work)[3] = totalEnergy();
+  }
+};
+
+Simulation::Simulation(std::shared_ptr<const Model> model) : impl_(std::make_unique<Impl>(std::move(model))) { reset(); }
+Simulation::~Simulation() = default;
+
+const Model& Simulation::model() const { return *impl_->model; }
+const Layout& Simulation::layout() const { return impl_->layout; }
+double Simulation::time() const { return impl_->time; }
+double* Simulation::data() { return impl_->data.data(); }
+const double* Simulation::data() const { return impl_->data.data(); }
+std::int64_t Simulation::evaluations() const { return impl_->dynamics.evaluations; }
+double Simulation::integratorLimit() const { return impl_->methodLimit(); }
+
+void Simulation::inputsChanged() {
+  impl_->flags &= ~accelerationsValid;
+  impl_->loadsOld = impl_->outputsOld = true;
+  impl_->geometryOld = impl_->model->settings.position == Position::input || impl_->geometryOld;
+  impl_->dynamics.takeDrivenVelocities();
+}
+
+void Simulation::parametersChanged() {
+  impl_->parametersOld = true;
+  inputsChanged();
+}
+
+void Simulation::reset() {
+  Impl& s = *impl_;
+  s.dynamics.setStart();
+  s.dynamics.evaluations = 0;
+  s.time = 0;
+  s.substeps = 0;
+  s.flags = 0;
+  s.geometryOld = s.loadsOld = s.outputsOld = s.parametersOld = true;
+}
+
+void Simulation::initialise(double time) {
+  Impl& s = *impl_;
+  s.time = time;
+  s.dynamics.prepare();
+  s.findLimits();
+  s.flags = initialised;
+  s.prepared = true;
+  s.geometryOld = s.parametersOld = false;
+  s.loadsOld = s.outputsOld = true;
+  if (s.energy) {
+    s.evaluate();
+    s.startEnergy();
+  }
+}
+
+void Simulation::step(double duration) {
+  Impl& s = *impl_;
+  if (!s.model->anyFree()) {
+    s.bringGeometry();
+    if (s.energy) {
+      s.evaluate();
+      s.startEnergy();
+      const Dynamics::Power before = s.dynamics.power();
+      s.dynamics.drift(duration, 0);
+      s.dynamics.evaluateReactions();
+      const Dynamics::Power after = s.dynamics.power();
+      s.field(Field::work)[0] += 0.5 * duration * (before.external + after.external);
+      s.field(Field::work)[1] += 0.5 * duration * (before.dissipated + after.dissipated);
+      s.field(Field::work)[3] = s.totalEnergy();
+    } else if (s.integrates) {
+      s.dynamics.drift(duration, 0);
+    }
+    s.time += duration;
+    s.loadsOld = s.outputsOld = true;
+    return;
+  }
+  double* const state = s.field(Field::acceleration);
+  std::copy_n(state, s.backup.size(), s.backup.begin());
+  const double time = s.time;
+  const std::int64_t substeps = s.substeps;
+  const std::uint32_t flags = s.flags;
+  s.outputsOld = true;
+  try {
+    s.integrate(duration);
+  } catch (...) {
+    std::copy(s.backup.begin(), s.backup.end(), state);
+    s.time = time;
+    s.substeps = substeps;
+    s.flags = flags;
+    s.geometryOld = s.loadsOld = true;
+    throw;
+  }
+}
+
+void Simulation::updateOutputs() {
+  Impl& s = *impl_;
+  if (s.parametersOld) {  // during initialisation parameters may still change
+    s.dynamics.prepare();
+    s.findLimits();
+    s.prepared = true;
+    s.parametersOld = false;
+  }
+  if (!s.outputsOld) return;
+  s.evaluate();
+  s.dynamics.updateOutputs();
+  s.outputsOld = false;
+}
+
+void Simulation::save(State& state) const {
+  const Impl& s = *impl_;
+  state.data.assign(s.data.begin(), s.data.end());
+  state.time = s.time;
+  state.substeps = s.substeps;
+  state.flags = s.flags;
+}
+
+void Simulation::restore(const State& state) {
+  Impl& s = *impl_;
+  // What `prepare` keeps beside the array depends on the slaves' masses only.
+  const Slice first = s.layout[Field::slaveMass], last = s.layout[Field::slaveInertia];
+  const bool sameMasses = std::equal(state.data.begin() + first.offset, state.data.begin() + last.offset + last.count,
+                                     s.data.begin() + first.offset);
+  std::copy(state.data.begin(), state.data.end(), s.data.begin());
+  s.time = state.time;
+  s.substeps = state.substeps;
+  s.flags = state.flags;
+  if (!s.prepared || !sameMasses) s.dynamics.prepareMass();
+  s.prepared = true;
+  s.geometryOld = s.loadsOld = s.outputsOld = true;
+  s.parametersOld = !(s.flags & initialised);
+}
+
+}  // namespace tiefmu

@@ -1,0 +1,31 @@
+// Axial springs and bushings between two ends.
+#pragma once
+
+#include "model.hpp"
+
+namespace tiefmu {
+
+// Motion of one end: position m, velocity m/s, angular velocity rad/s, rotation since the start.
+struct EndMotion {
+  Vec3 x = Vec3::Zero(), v = Vec3::Zero(), w = Vec3::Zero();
+  Quat q = Quat::Identity();
+};
+
+// What the spring does to its ends: forces N, moments N m on a and b; stored energy J; dissipated power W.
+struct SpringLoad {
+  Vec3 fa = Vec3::Zero(), fb = Vec3::Zero(), ta = Vec3::Zero(), tb = Vec3::Zero();
+  double energy = 0, dissipation = 0;
+};
+
+// Axial: stiffness times the elongation along the current line, damping times its rate.
+// Bushing: translation D = x_a - x_b - R_b arm, rotation vector of R_b R_a^T, both resolved in the inertial axes; the
+// moment of the force on a about b is balanced on b. With isotropic stiffness the forces derive from
+// (k D.D + kr theta.theta) / 2.
+SpringLoad springLoad(const Spring& spring, const EndMotion& a, const EndMotion& b);
+
+// The linear part about the present state, material stiffness and the tension's transverse one: displacement u and
+// small rotation (in x and w of EndMotion: `v`, `w` are read) to restoring loads. With `damping` the damping
+// coefficients in place of the stiffness. Symmetric and positive semidefinite.
+SpringLoad springTangent(const Spring& spring, const EndMotion& a, const EndMotion& b, bool damping);
+
+}  // namespace tiefmu

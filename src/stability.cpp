@@ -1,0 +1,192 @@
+#include "stability.hpp"
+
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <complex>
+#include <limits>
+
+#include "integrator.hpp"
+
+namespace tiefmu {
+namespace {
+
+constexpr int maxVectors = 32, maxRestarts = 40;
+constexpr double tolerance = 1e-10;
+constexpr double none = 1e30;
+
+// Spectral radius of one step of size h on x'' = -omega^2 x - c x'.
+double nohBatheRadius(double h, double omega, double c) {
+  constexpr double p = nohBathe::p, q0 = nohBathe::q0, q1 = nohBathe::q1, q2 = nohBathe::q2;
+  Mat3 step;
+  for (int column = 0; column < 3; ++column) {
+    Vec3 unit = Vec3::Unit(column);
+    double x = unit(0), v = unit(1), a = unit(2);
+    const auto force = [&](double position, double velocity) { return -omega * omega * position - c * velocity; };
+    const double h1 = p * h, h2 = (1 - p) * h;
+    x += h1 * v + 0.5 * h1 * h1 * a;
+    const double a1 = force(x, v + h1 * a);
+    v += 0.5 * h1 * (a + a1);
+    x += h2 * v + 0.5 * h2 * h2 * a1;
+    const double a2 = force(x, v + h2 * a1);
+    v += h2 * (q0 * a + (0.5 + q1) * a1 + q2 * a2);
+    step.col(column) = Vec3(x, v, a2);
+  }
+  return Eigen::EigenSolver<Mat3>(step, false).eigenvalues().cwiseAbs().maxCoeff();
+}
+
+double rk4Radius(double h, double omega, double c) {
+  double radius = 0;
+  const std::complex<double> root = std::sqrt(std::complex<double>(c * c - 4 * omega * omega));
+  for (double sign : {1.0, -1.0}) {
+    const std::complex<double> z = 0.5 * h * (-c + sign * root);
+    radius = std::max(radius, std::abs(1.0 + z * (1.0 + z / 2.0 * (1.0 + z / 3.0 * (1.0 + z / 4.0)))));
+  }
+  return radius;
+}
+
+}  // namespace
+
+double stableStep(Method method, double omega, double c) {
+  if (!(omega > 0) && !(c > 0)) return none;
+  if (method == Method::centralDifference || method == Method::symplecticEuler)
+    return 4 / (c + std::sqrt(c * c + 4 * omega * omega));  // = 2/omega (sqrt(1 + z^2) - z), also for omega = 0
+  const auto stable = [&](double h) {
+    const double radius = method == Method::rk4 ? rk4Radius(h, omega, c) : nohBatheRadius(h, omega, c);
+    return radius <= 1 + 1e-10;
+  };
+  const double scale = 1 / std::max(omega, c);
+  double low = 0, high = 8 * scale;
+  for (double h = 0.02 * scale; h < high; h += 0.02 * scale) {
+    if (!stable(h)) {
+      high = h;
+      break;
+    }
+    low = h;
+  }
+  for (int i = 0; i < 60; ++i) (stable(0.5 * (low + high)) ? low : high) = 0.5 * (low + high);
+  return low;
+}
+
+double nodalStep(const Model& model, const double* addedMass, const double* addedInertia, const double* stiffness,
+                 const double* rotationalStiffness) {
+  double smallest = none;
+  for (int group : {rotatingFreeMaster, freeMaster})
+    for (int i = model.begin[group]; i < model.begin[group + 1]; ++i) {
+      if (stiffness[i] > 0)
+        smallest = std::min(smallest, std::sqrt(2 * (model.nodeMass[i] + addedMass[i]) / stiffness[i]));
+      if (i < model.rotating() && rotationalStiffness[i] > 0)
+        smallest =
+            std::min(smallest, std::sqrt(2 * (model.nodeInertia[i] + addedInertia[i]) / rotationalStiffness[i]));
+    }
+  return smallest;
+}
+
+Spectrum::Spectrum(Dynamics& dynamics)
+    : dynamics_(dynamics), size_(3 * (dynamics.model.free() + dynamics.model.rotating() - dynamics.model.freeBegin())) {
+  const Model& model = dynamics.model;
+  u_.resize(3 * static_cast<std::size_t>(model.nodes()));
+  f_.resize(u_.size());
+  turn_.resize(3 * static_cast<std::size_t>(model.rotating()));
+  t_.resize(turn_.size());
+}
+
+// Compact vectors hold the free translations, then the free rotations.
+void Spectrum::apply(const double* x, double* y, bool damping) {
+  const Model& model = dynamics_.model;
+  const int first = 3 * model.freeBegin(), free = 3 * model.free(), turning = size_ - free;
+  std::fill(u_.begin(), u_.end(), 0.0);
+  std::fill(turn_.begin(), turn_.end(), 0.0);
+  std::copy_n(x, free, u_.begin() + first);
+  std::copy_n(x + free, turning, turn_.begin() + first);
+  dynamics_.springOperator(u_.data(), turn_.data(), f_.data(), t_.data(), damping);
+  std::copy_n(f_.begin() + first, free, y);
+  std::copy_n(t_.begin() + first, turning, y + free);
+}
+
+void Spectrum::solve(const double* p, double* x) {
+  const Model& model = dynamics_.model;
+  const int first = 3 * model.freeBegin(), free = 3 * model.free(), turning = size_ - free;
+  std::copy_n(p, free, f_.begin() + first);
+  std::copy_n(p + free, turning, t_.begin() + first);
+  dynamics_.solveInertia(f_.data(), t_.data());
+  std::copy_n(f_.begin() + first, free, x);
+  std::copy_n(t_.begin() + first, turning, x + free);
+}
+
+Spectrum::Value Spectrum::lanczos(bool damping, double* mode, int vectors) {
+  using Vector = Eigen::Map<Eigen::VectorXd>;
+  using Small = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, maxVectors, maxVectors>;
+  const auto v = [&](int j) { return Vector(basis_.data() + static_cast<std::ptrdiff_t>(size_) * j, size_); };
+  const auto mv = [&](int j) { return Vector(image_.data() + static_cast<std::ptrdiff_t>(size_) * j, size_); };
+  Small tridiagonal = Small::Zero(vectors, vectors);
+  mv(0) = Vector(mode, size_);
+  solve(mv(0).data(), v(0).data());
+  double norm = std::sqrt(std::max(0.0, v(0).dot(mv(0))));
+  if (!(norm > 0)) return {};
+  v(0) /= norm;
+  mv(0) /= norm;
+  int used = 0;
+  double beta = 0;
+  while (used < vectors) {
+    const int j = used++;
+    auto p = mv(j + 1), x = v(j + 1);
+    apply(v(j).data(), p.data(), damping);
+    solve(p.data(), x.data());
+    tridiagonal(j, j) = v(j).dot(p);
+    for (int sweep = 0; sweep < 2; ++sweep)  // full reorthogonalisation
+      for (int i = 0; i <= j; ++i) {
+        const double c = mv(i).dot(x);
+        x -= c * v(i);
+        p -= c * mv(i);
+      }
+    beta = std::sqrt(std::max(0.0, x.dot(p)));
+    const double scale = tridiagonal.diagonal().head(used).cwiseAbs().maxCoeff();
+    if (!(beta > 1e-14 * scale)) {
+      beta = 0;
+      break;
+    }
+    if (used < vectors) tridiagonal(j, j + 1) = tridiagonal(j + 1, j) = beta;
+    x /= beta;
+    p /= beta;
+  }
+  const Eigen::SelfAdjointEigenSolver<Small> eigen(tridiagonal.topLeftCorner(used, used));
+  const auto y = eigen.eigenvectors().col(used - 1);
+  Vector ritz(mode, size_);
+  ritz.setZero();
+  for (int j = 0; j < used; ++j) ritz += y(j) * mv(j);
+  return {eigen.eigenvalues()(used - 1), beta * std::abs(y(used - 1))};
+}
+
+Spectrum::Value Spectrum::largest(bool damping, double* mode) {
+  std::vector<double> own;
+  if (!mode) {
+    own.resize(size_);
+    mode = own.data();
+  }
+  // A start that no symmetry is orthogonal to, the same on every machine.
+  std::uint64_t seed = 0x9E3779B97F4A7C15u;
+  for (int k = 0; k < size_; ++k) {
+    seed ^= seed << 13;
+    seed ^= seed >> 7;
+    seed ^= seed << 17;
+    mode[k] = static_cast<double>(seed >> 11) * 0x1p-53 - 0.5;
+  }
+  const int vectors = std::min(maxVectors, size_);
+  basis_.resize(static_cast<std::size_t>(size_) * (vectors + 1));
+  image_.resize(basis_.size());
+  Value value;
+  for (int restart = 0; restart < maxRestarts; ++restart) {
+    value = lanczos(damping, mode, vectors);
+    if (value.residual <= tolerance * value.ritz) break;
+  }
+  basis_.resize(static_cast<std::size_t>(size_) * (refreshVectors + 1));
+  image_.resize(basis_.size());
+  basis_.shrink_to_fit();
+  image_.shrink_to_fit();
+  return value;
+}
+
+Spectrum::Value Spectrum::refresh(double* mode) { return lanczos(false, mode, std::min(refreshVectors, size_)); }
+
+}  // namespace tiefmu
