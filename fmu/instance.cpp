@@ -150,8 +150,7 @@ void Instance::enterInitializationMode() {
 }
 
 void Instance::exitInitializationMode() {
-  if (parametersSet || inputsSet) simulation.initialise(clock.time);
-  parametersSet = inputsSet = false;
+  simulation.initialise(clock.time);
   if (simulation.model().anyFree() && logger.wants(Category::stability)) {
     const std::string message = "stable time step " + text(*simulation.field(Field::stableTimeStep)) +
                                 " s, nodal time step " + text(*simulation.field(Field::nodalTimeStep)) +
@@ -164,7 +163,6 @@ void Instance::exitInitializationMode() {
 void Instance::reset() {
   simulation.reset();
   clock = {};
-  parametersSet = inputsSet = true;
   state = instantiated;
 }
 
@@ -201,10 +199,6 @@ void Instance::forRuns(const fmi2ValueReference refs[], std::size_t count, Use u
 
 void Instance::get(const fmi2ValueReference refs[], std::size_t count, double values[]) {
   if (count > 0 && !values) throw Refused("the array of values is a null pointer");
-  if (state == initializationMode && parametersSet) {
-    simulation.initialise(clock.time);
-    parametersSet = inputsSet = false;
-  }
   if (state == initializationMode || state == stepComplete) simulation.updateOutputs();
   const double* data = simulation.data();
   forRuns(refs, count, [&](const Range& range, std::uint32_t first, std::size_t run, std::size_t i) {
@@ -238,14 +232,8 @@ void Instance::set(const fmi2ValueReference refs[], std::size_t count, const dou
   forRuns(refs, count, [&](const Range& range, std::uint32_t first, std::size_t run, std::size_t i) {
     std::memcpy(data + range.place + (first - range.first), values + i, run * sizeof(double));
   });
-  if (parameters) {
-    simulation.parametersChanged();
-    parametersSet = true;
-  }
-  if (inputs) {
-    simulation.inputsChanged();
-    inputsSet = true;
-  }
+  if (parameters) simulation.parametersChanged();
+  if (inputs) simulation.inputsChanged();
 }
 
 void Instance::doStep(double point, double step) {
@@ -278,8 +266,6 @@ void Instance::getState(fmi2FMUstate* saved) {
   simulation.save(s.simulation);
   s.state = state;
   s.clock = clock;
-  s.parametersSet = parametersSet;
-  s.inputsSet = inputsSet;
 }
 
 void Instance::setState(fmi2FMUstate saved) {
@@ -287,8 +273,6 @@ void Instance::setState(fmi2FMUstate saved) {
   simulation.restore(s.simulation);
   state = s.state;
   clock = s.clock;
-  parametersSet = s.parametersSet;
-  inputsSet = s.inputsSet;
 }
 
 void Instance::freeState(fmi2FMUstate* saved) {

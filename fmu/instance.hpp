@@ -82,7 +82,6 @@ class Instance {
     Simulation::State simulation;
     State state;
     Clock clock;
-    bool parametersSet, inputsSet;
   };
 
   const Range& rangeOf(std::uint32_t reference) const;
@@ -98,7 +97,6 @@ class Instance {
   std::vector<std::uint32_t> firstRange;  // range of every 64th reference
   std::uint32_t references = 0;
   Clock clock;
-  bool parametersSet = true, inputsSet = true;  // since the simulation was last initialised
   std::unordered_map<fmi2FMUstate, std::unique_ptr<SavedState>> savedStates;
 };
 
