@@ -280,6 +280,7 @@ struct FieldName {
   std::size_t components;
 };
 
+// The fields that mean something outside the solver.
 constexpr FieldName fieldNames[] = {
     {Field::timeStep, "time_step", 1},
     {Field::safety, "safety", 1},
@@ -301,11 +302,6 @@ constexpr FieldName fieldNames[] = {
     {Field::offset, "offset", 3},
     {Field::segmentRotation, "segment_rotation", 4},
     {Field::orientation, "orientation", 4},
-    {Field::angle, "angle", 3},
-    {Field::work, "work", 1},
-    {Field::lagged, "lagged", 1},
-    {Field::predicted, "predicted", 1},
-    {Field::mode, "mode", 1},
     {Field::slaveVelocity, "slave_velocity", 3},
     {Field::slaveSpin, "slave_spin", 3},
     {Field::reactionForce, "reaction_force", 3},
@@ -318,7 +314,6 @@ constexpr FieldName fieldNames[] = {
     {Field::stableTimeStep, "stable_time_step", 1},
     {Field::nodalTimeStep, "nodal_time_step", 1},
 };
-static_assert(std::size(fieldNames) == static_cast<std::size_t>(Field::count));
 
 // A simulation with the FMU's view of it: fields by the names above, variables by their FMU names.
 class Run {

@@ -114,16 +114,19 @@ def parse_keyword(line: str) -> tuple[str, dict]:
 def records(lines: list[str], count: int | None):
     """Element records [id, nodes...]: of `count` nodes, or (None) continued where a line ends with a comma."""
     record = []
+
+    def checked():
+        if count and len(record) != count + 1:
+            raise SceneError(f"element {record[0]} has {len(record) - 1} nodes, its type has {count}")
+        return record
+
     for line in lines:
         record += [int(item) for item in line.split(",") if item.strip()]
-        complete = len(record) >= count + 1 if count else not line.endswith(",")
-        if complete:
-            if count and len(record) != count + 1:
-                raise SceneError(f"element {record[0]} has {len(record) - 1} nodes, its type has {count}")
-            yield record
+        if len(record) > count if count else not line.endswith(","):
+            yield checked()
             record = []
     if record:
-        yield record
+        yield checked()
 
 
 def add(table: dict, number: int, value, what: str):

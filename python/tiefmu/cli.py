@@ -56,7 +56,8 @@ def parser() -> argparse.ArgumentParser:
         "units; inputs without a column keep their start value, and are linear between the rows.")
     run.add_argument("model", metavar="SCENE-or-FMU", help="scene file (TOML) or FMU")
     run.add_argument("--stop-time", metavar="T", type=positive, help="end, s (default: of the input, or of the FMU)")
-    run.add_argument("--step", metavar="H", type=positive, help="communication step, s (default: the FMU's)")
+    run.add_argument("--step", metavar="H", type=positive, help="communication step, s (default: the FMU's, "
+                     "but at least 500 steps)")
     run.add_argument("--input", metavar="CSV", type=Path, help="inputs over time")
     run.add_argument("--output", metavar="CSV", type=Path, help="file to write the outputs to")
     run.add_argument("--plot", metavar="PNG", type=Path, help="file to draw the outputs to")
@@ -162,3 +163,7 @@ def units_of(fmu: Path) -> dict[str, str]:
 def run_demo(options):
     from .demo import SCENES, demo
     return 0 if demo(options.out, options.scenes or SCENES) else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

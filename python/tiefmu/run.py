@@ -12,6 +12,9 @@ import numpy as np
 from .schema import suggestion
 
 
+STEPS = 500  # at least, where the caller leaves the step open
+
+
 class RunError(Exception):
     """A run that cannot start or did not finish; one line 'FILE: message'."""
 
@@ -21,7 +24,7 @@ def run(fmu: Path, stop_time: float | None = None, step: float | None = None, in
     """Runs the FMU and returns its outputs: a structured array with `time` (s) and one column an output.
 
     stop_time, s: by default the end of the input CSV, else the FMU's default experiment. step: communication step, s,
-    by default the FMU's. inputs: CSV with `time` and names of inputs, linear in between; a time given twice is a jump.
+    by default the FMU's, but so small that the run has at least STEPS. inputs: CSV with `time` and names of inputs, linear in between; a time given twice is a jump.
     Row k holds what the FMU answers at the end of step k, the inputs being those of the start of the step.
     name: how messages call the FMU. Raises RunError.
     """
@@ -39,10 +42,10 @@ def run(fmu: Path, stop_time: float | None = None, step: float | None = None, in
     start = number(experiment and experiment.startTime, 0.0)
     if stop_time is None:
         stop_time = float(signals["time"][-1]) if signals is not None else number(experiment and experiment.stopTime, 1)
-    if step is None:
-        step = number(experiment and experiment.stepSize, (stop_time - start) / 500)
     if not stop_time > start:
         raise RunError(f"{inputs or name}: stop time {stop_time:g} s is not after start time {start:g} s")
+    if step is None:
+        step = min((stop_time - start) / STEPS, number(experiment and experiment.stepSize, np.inf))
 
     said = []
 

@@ -1,0 +1,247 @@
+"""The command line: what it prints, where it writes, how it ends."""
+
+import csv
+import json
+import signal
+import subprocess
+import sys
+import time
+import zipfile
+
+import numpy as np
+import pytest
+
+import tiefmu
+from conftest import toml
+from tiefmu import cli
+from tiefmu.cli import main
+
+
+@pytest.fixture
+def free(weld) -> dict:
+    """The masters free on ground springs, everything a demo checks exposed."""
+    weld["node"] = [{"nodes": "all", "motion": "free", "mass": 1.0}, {"nodes": [101], "mass": 0.7}]
+    weld["tie"][0]["formulation"] = "optimized"
+    weld["spring"] = [{"ground": [1, 2, 3, 4], "kind": "bushing", "stiffness": 1000.0}]
+    weld["interface"] = {"expose": ["energy", "drift", "power_residual"]}
+    return weld
+
+
+def rows(path) -> tuple[list[str], np.ndarray]:
+    with open(path, newline="") as file:
+        header, *values = csv.reader(file)
+    return header, np.array(values, float)
+
+
+def test_build_names_the_fmu_after_the_scene(weld, scene_file, capsys, tmp_path):
+    (tmp_path / "scenes").mkdir()
+    name = scene_file(weld, "scenes/weld.toml")
+    assert main(["build", name]) == 0
+    said = capsys.readouterr()
+    assert said.out.startswith("weld.fmu: 1 tie, 1 slave, 4 masters, 0 points, 0 springs, ")
+    assert said.err.startswith(f"warning: {name}: tie 'weld': slave 101: offset d = 0.04 m")
+    assert zipfile.is_zipfile("weld.fmu")
+    assert main(["build", name, "-o", "other.fmu"]) == 0
+    assert (tmp_path / "other.fmu").read_bytes() == (tmp_path / "weld.fmu").read_bytes()
+
+
+def test_info_of_a_scene_and_of_its_fmu_are_the_same(weld, scene_file, capsys):
+    name = scene_file(weld)
+    assert main(["build", name]) == 0
+    capsys.readouterr()
+    assert main(["info", name, "--json"]) == main(["info", "weld.fmu", "--json"]) == 0
+    one, two = map(json.loads, capsys.readouterr().out.splitlines())
+    assert one == two == tiefmu.report(tiefmu.load(name))
+    assert main(["info", "weld.fmu"]) == 0
+    text = capsys.readouterr().out
+    assert text.startswith("weld.fmu: Spot weld on a quarter panel\n1 tie, 1 slave, 4 masters")
+    for needed in ("tie 'weld': default formulation, search 'box' within 0.1 m", "-0.40000", "0.28000 -> 1: 0.196, 0",
+                   "stable  no limit", "nodal   no limit", "freedoms: 12 translations, 0 rotations", "warning: "):
+        assert needed in text
+
+
+@pytest.mark.parametrize("arguments", [["run", "weld.toml"], ["run", "weld.fmu"]])
+def test_run_writes_csv_and_picture(weld, scene_file, capsys, tmp_path, arguments):
+    main(["build", scene_file(weld)])
+    (tmp_path / "in.csv").write_text("time,slave[1].f[3],master[1].v[3]\n0,0,1\n1,100,1\n")
+    capsys.readouterr()
+    assert main([*arguments, "--input", "in.csv", "--step", "0.25", "--output", "out.csv", "--plot", "out.png"]) == 0
+    assert capsys.readouterr().out == f"{arguments[1]}: 4 steps to t = 1 s, 15 outputs, wrote out.csv, wrote out.png\n"
+    header, values = rows("out.csv")
+    assert header[0] == "time" and set(header[1:]) == \
+        {f"slave[1].v[{k}]" for k in (1, 2, 3)} | {f"master[{i}].f[{k}]" for i in (1, 2, 3, 4) for k in (1, 2, 3)}
+    table = dict(zip(header, values.T))
+    assert table["time"].tolist() == [0, 0.25, 0.5, 0.75, 1.0]
+    # row k answers the inputs of the start of step k
+    assert table["slave[1].v[3]"] == pytest.approx([0.28] * 5, abs=1e-14)
+    assert table["master[1].f[3]"] == pytest.approx([0, 0, 7, 14, 21], abs=1e-12)
+    assert sum(table[f"master[{i}].f[3]"] for i in (1, 2, 3, 4)) == pytest.approx([0, 0, 25, 50, 75], abs=1e-12)
+    assert (tmp_path / "out.png").read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
+
+
+def test_run_prints_a_summary_without_output_files(weld, scene_file, capsys):
+    assert main(["run", scene_file(weld), "--stop-time", "0.01", "--step", "0.001"]) == 0
+    said = capsys.readouterr()
+    assert said.out.startswith("weld.toml: 10 steps to t = 0.01 s, 15 outputs\n")
+    assert "slave[1].v[1]" in said.out
+    assert said.err == ""
+
+
+def test_run_takes_the_default_experiment_of_the_fmu(free, scene_file, capsys):
+    import fmpy
+    main(["build", scene_file(free)])
+    experiment = fmpy.read_model_description("weld.fmu").defaultExperiment
+    assert main(["run", "weld.fmu", "--output", "out.csv"]) == 0
+    values = rows("out.csv")[1]
+    assert values[-1, 0] == pytest.approx(float(experiment.stopTime), rel=1e-12)
+    assert values[1, 0] == pytest.approx(float(experiment.stepSize), rel=1e-12)
+
+
+def test_a_time_given_twice_is_a_jump(weld, scene_file, tmp_path):
+    (tmp_path / "in.csv").write_text("time,slave[1].f[3]\n0,0\n0.5,0\n0.5,100\n1,100\n")
+    assert main(["run", scene_file(weld), "--input", "in.csv", "--step", "0.25", "--output", "out.csv"]) == 0
+    header, values = rows("out.csv")
+    force = sum(values[:, header.index(f"master[{i}].f[3]")] for i in (1, 2, 3, 4))
+    assert dict(zip(values[:, 0], force.round(9))) == {0: 0, 0.25: 0, 0.5: 0, 0.75: 100, 1: 100}
+
+
+INPUTS = {
+    "unknown column": ("time,slave[1].g[3]\n0,0\n",
+                       "in.csv: column 'slave[1].g[3]': no such variable; did you mean 'slave[1].f[3]'?"),
+    "output": ("time,slave[1].v[3]\n0,0\n", "in.csv: column 'slave[1].v[3]' is no input but of causality output"),
+    "repeated column": ("time,slave[1].f[3],slave[1].f[3]\n0,0,0\n", "in.csv: column 'slave[1].f[3]' is repeated"),
+    "no time": ("t,slave[1].f[3]\n0,0\n", "in.csv: has no column 'time'; found t, slave[1].f[3]"),
+    "time goes back": ("time,slave[1].f[3]\n0,0\n1,0\n\n0.5,0\n",
+                       "in.csv: line 5: time goes back from 1 to 0.5 s; times must not decrease"),
+    "text": ("time,slave[1].f[3]\n0,x\n", "in.csv: line 2: slave[1].f[3]: expected a number, found 'x'"),
+    "nan": ("time,slave[1].f[3]\n0,nan\n", "in.csv: line 2: slave[1].f[3]: nan is not a finite number"),
+    "short row": ("time,slave[1].f[3]\n0,0\n1\n", "in.csv: line 3: expected 2 values, found 1"),
+    "empty": ("", "in.csv: is empty; expected a header with 'time' and names of inputs"),
+    "header only": ("time\n", "in.csv: has no values below its header"),
+    "ends at the start": ("time,slave[1].f[3]\n0,0\n", "in.csv: stop time 0 s is not after start time 0 s"),
+    "missing": (None, "in.csv: no such file"),
+}
+
+
+@pytest.mark.parametrize("case", INPUTS)
+def test_wrong_inputs(weld, scene_file, capsys, tmp_path, case):
+    text, line = INPUTS[case]
+    name = scene_file(weld)
+    if text is not None:
+        (tmp_path / "in.csv").write_text(text)
+    assert main(["run", name, "--input", "in.csv", "--output", "out.csv"]) == 2
+    said = capsys.readouterr()
+    assert (said.out, said.err) == ("", f"error: {line}\n")
+    assert not (tmp_path / "out.csv").exists()
+
+
+@pytest.mark.parametrize("arguments, line", [
+    (["run", "no.fmu"], "no.fmu: no such file"),
+    (["info", "no.fmu"], "no.fmu: no such file"),
+    (["info", "text.fmu"], "text.fmu: not an FMU (a zip archive)"),
+    (["run", "text.fmu"], "text.fmu: not an FMU that FMPy can read: File is not a zip file"),
+    (["info", "foreign.fmu"], "foreign.fmu: holds no resources/report.json, so it was not made by tiefmu"),
+    (["run", "weld.toml", "--output", "no/out.csv"], "no/out.csv: folder no does not exist"),
+    (["run", "weld.toml", "--plot", "no/out.png"], "no/out.png: folder no does not exist"),
+    (["build", "weld.toml", "-o", "no/weld.fmu"], "no/weld.fmu: folder no does not exist"),
+    (["build", "weld.toml", "-o", "folder"], "folder: is a folder"),
+    (["demo", "--scenes", "folder"], "folder: no scenes here; give the folder with --scenes"),
+])
+def test_wrong_files(weld, scene_file, capsys, tmp_path, arguments, line):
+    scene_file(weld)
+    (tmp_path / "folder").mkdir()
+    (tmp_path / "text.fmu").write_text("no archive")
+    with zipfile.ZipFile(tmp_path / "foreign.fmu", "w") as archive:
+        archive.writestr("modelDescription.xml", "<fmiModelDescription/>")
+    before = sorted(tmp_path.rglob("*"))
+    assert main(arguments) == 2
+    said = capsys.readouterr()
+    assert (said.out, said.err.splitlines()[-1]) == ("", f"error: {line}")
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+@pytest.mark.parametrize("option, value", [("--step", "0"), ("--step", "-1"), ("--step", "x"), ("--stop-time", "nan"),
+                                           ("--stop-time", "inf")])
+def test_steps_and_times_must_be_positive(weld, scene_file, capsys, option, value):
+    with pytest.raises(SystemExit) as stop:
+        main(["run", scene_file(weld), f"{option}={value}"])
+    assert stop.value.code == 2
+    assert f"argument {option}: '{value}' is not a positive number" in capsys.readouterr().err
+
+
+def test_a_run_that_diverges_says_where(free, scene_file, capsys):
+    free["integrator"] = {"time_step": 1.0, "safety": 1.0}
+    free["spring"][0]["damping"] = 1e6
+    free["initial"] = [{"nodes": [1], "v": [0, 0, 1e300]}]
+    assert main(["run", scene_file(free), "--stop-time", "1e3", "--step", "1"]) == 2
+    said = capsys.readouterr()
+    assert said.err.startswith("error: weld.toml: stopped at t = ") and said.err.count("\n") == 1
+
+
+def test_exit_statuses_of_the_process(weld, scene_file, command):
+    name = scene_file(weld)
+    good = command("build", name)
+    assert good.returncode == 0 and good.stdout.startswith("weld.fmu: ")
+    weld["tie"][0]["slaves"] = [999]
+    bad = command("build", scene_file(weld))
+    assert (bad.returncode, bad.stdout, bad.stderr) == \
+        (2, "", "error: weld.toml: tie 'weld': slaves: node 999 is not in the mesh (ids 1..101)\n")
+    nothing = command()
+    assert nothing.returncode == 2 and "COMMAND" in nothing.stderr and "Traceback" not in nothing.stderr
+
+
+@pytest.mark.parametrize("name", ["build", "info", "run", "demo"])
+def test_help(capsys, name):
+    with pytest.raises(SystemExit) as stop:
+        main([name, "--help"])
+    assert stop.value.code == 0
+    assert f"usage: tiefmu {name}" in capsys.readouterr().out
+
+
+def test_version(capsys):
+    with pytest.raises(SystemExit):
+        main(["--version"])
+    assert capsys.readouterr().out == f"tiefmu {tiefmu.__version__}\n"
+
+
+def test_interrupt_ends_quietly(monkeypatch, capsys):
+    def interrupted(options):
+        raise KeyboardInterrupt
+    monkeypatch.setattr(cli, "run_build", interrupted)
+    assert main(["build", "weld.toml"]) == 130
+    assert capsys.readouterr() == ("", "")
+
+
+def test_interrupt_of_a_running_simulation(weld, scene_file, tmp_path):
+    scene_file(weld)
+    process = subprocess.Popen([sys.executable, "-m", "tiefmu.cli", "run", "weld.toml", "--stop-time", "1e6", "--step",
+                                "1e-3"], cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    time.sleep(3)
+    process.send_signal(signal.SIGINT)
+    out, err = process.communicate(timeout=60)
+    assert (process.returncode, out, err) == (130, "", "")
+
+
+def test_demo(free, weld, tmp_path, capsys):
+    scenes = tmp_path / "scenes"
+    scenes.mkdir()
+    (scenes / "free.toml").write_text(toml(free))
+    (scenes / "free.csv").write_text("time,slave[1].f[3]\n0,10\n0.5,10\n")
+    assert main(["demo", "--scenes", str(scenes), "--out", str(tmp_path / "out")]) == 0
+    said = capsys.readouterr().out
+    assert "free" in said and "all checks held" in said
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["free.csv", "free.fmu", "free.png"]
+    assert rows(tmp_path / "out" / "free.csv")[1][-1, 0] == pytest.approx(0.5)
+
+
+def test_demo_reports_a_check_that_fails():
+    from tiefmu.demo import check
+    good = np.array([(0.0, 1.0, 1e-15), (1.0, 2.0, 2e-15)], dtype=[("time", float), ("slave[1].v[1]", float),
+                                                                  ("drift", float)])
+    assert all(one.held for one in check(good))
+    broken = good.copy()
+    broken["slave[1].v[1]"][1] = np.nan
+    assert [one.name for one in check(broken) if not one.held] == ["not finite"]
+    broken = good.copy()
+    broken["drift"][1] = 1e-3
+    assert [one.name for one in check(broken) if not one.held] == ["drift [m]"]
