@@ -1,5 +1,7 @@
 #include "influences.hpp"
 
+#include "segment.hpp"
+
 namespace tiefmu {
 
 Influences::Influences(const Model& m, const Layout& l, const std::vector<Block>& blocks)
@@ -220,10 +222,11 @@ void Influences::findAdditions() {
   eachSegment([&](const Segment& s) {
     for (int slave = s.first; slave < s.last; ++slave) {
       const std::uint32_t m = known(Field::slaveMass, slave, 1), own = known(Field::slaveInertia, slave, 1);
-      for (int i = 0; i < s.group.corners; ++i) {
-        const std::size_t at = static_cast<std::size_t>(slave - s.group.firstSlave) * s.group.corners + i;
+      const int n = s.group.corners;
+      const Phi phi = clamped(n, &s.group.weight[static_cast<std::size_t>(slave - s.group.firstSlave) * n]);
+      for (int i = 0; i < n; ++i) {
         const bool mean = s.group.coupling == Coupling::meanMotion;
-        if (!mean && s.group.clamped[at] == 0) continue;
+        if (!mean && phi[i] == 0) continue;
         add(addedMass[s.node[i]], scalarPattern, m);
         if (mean) add(addedMass[s.node[i]], scalarPattern, own);
         if (s.group.coupling == Coupling::rotation) {
@@ -241,16 +244,14 @@ void Influences::findInertialLoads() {
     return;
   }
   for (int node = 0; node < model.nodes(); ++node) {
-    const bool changes = !addedMass[node].empty(), turnChanges = !addedInertia[node].empty();
-    add(inertialForce[node], changes ? changing(identityPattern) : identityPattern, acceleration(node));
-    add(inertialMoment[node], turnChanges ? changing(identityPattern) : identityPattern, angularAcceleration(node));
-    add(inertialForce[node], moving(identityPattern), addedMass[node]);
-    add(inertialMoment[node], moving(identityPattern), addedInertia[node]);
-    if (!isFree(node)) continue;
-    CornerMap mass;
-    mass.vv = changes ? changing(identityPattern) : identityPattern;
-    mass.ww = turnChanges ? changing(identityPattern) : identityPattern;
-    coupled.push_back({node, node, mass});
+    const Pattern mass = addedMass[node].empty() ? identityPattern : changing(identityPattern);
+    const Pattern inertia = addedInertia[node].empty() ? identityPattern : changing(identityPattern);
+    const std::uint32_t a = acceleration(node), z = angularAcceleration(node);
+    add(inertialForce[node], mass, a);
+    add(inertialMoment[node], inertia, z);
+    if (a != noReference) add(inertialForce[node], moving(identityPattern), addedMass[node]);
+    if (z != noReference) add(inertialMoment[node], moving(identityPattern), addedInertia[node]);
+    if (isFree(node)) coupled.push_back({node, node, {mass, {}, {}, inertia}});
   }
 }
 

@@ -167,7 +167,6 @@ void field(Archive& a, TieGroup& g) {
   field(a, g.node);
   field(a, g.begin);
   field(a, g.weight);
-  field(a, g.clamped);
 }
 
 template <class Archive>
@@ -281,9 +280,7 @@ void checkGroups(const Model& m) {
     const std::size_t corners = g.corners, segments = g.begin.size() - 1, slaves = g.begin.back();
     requireSize(g.node, corners * segments, "corners of segments");
     requireSize(g.weight, corners * slaves, "weights");
-    requireSize(g.clamped, corners * slaves, "clamped weights");
     requireFinite(g.weight, "weights that are not finite");
-    requireFinite(g.clamped, "weights that are not finite");
     const int nodes = g.coupling == Coupling::rotation ? m.rotating() : m.nodes();
     for (int node : g.node) require(node >= 0 && node < nodes, "corners of segments");
     next += slaves;

@@ -73,7 +73,8 @@ Dynamics::Dynamics(const Model& m, const Layout& l, double* d) : model(m), layou
     stepSpin_.resize(3 * r);
   }
   const bool small = has(Field::position) && !model.finite();
-  if (springs || energy || offsetsTurn_ || small) {
+  const bool stages = model.settings.method == Method::rk4 && model.anyFree();
+  if (springs || energy || stages || small) {
     vs_.resize(3 * s);
     ws_.resize(3 * u);
   }
@@ -162,7 +163,7 @@ void Dynamics::updateGeometry() {
   eachGroup([&](const TieGroup& group, SegmentRange range, TieGeometry, std::size_t g) {
     if (group.coupling != Coupling::meanMotion) return;
     if (has(Field::position)) updateFrames(group, range, field(Field::position), frames_.data() + firstFrame_[g]);
-    if (has(Field::segmentRotation) && offsetsTurn_)
+    if (has(Field::segmentRotation))
       rotateOffsets(group, range, field(Field::segmentRotation) + 4 * firstFrame_[g], model.slaveOffset.data(),
                     field(Field::offset));
   });
@@ -375,12 +376,16 @@ void Dynamics::drift(double h, double ahead) {
       turnQuaternion(field(Field::orientation) + 4 * k, h * (end.node >= 0 ? Vec3(at(w, end.node)) : Vec3(at(ws_.data(), end.slave))));
     }
   }
+  const bool turns = has(Field::segmentRotation);
   eachGroup([&](const TieGroup& group, SegmentRange range, TieGeometry shape, std::size_t g) {
     if (group.coupling == Coupling::rotation && offsetsTurn_)
       turnOffsets(group, range, h, w, inverseLength2_.data(), field(Field::offset));
-    if (group.coupling == Coupling::meanMotion && has(Field::segmentRotation)) {
-      double* q = field(Field::segmentRotation) + 4 * firstFrame_[g];
-      if (model.finite()) return turnSegments(group, range, h, field(Field::position), v, q);
+    if (group.coupling != Coupling::meanMotion) return;
+    double* q = turns ? field(Field::segmentRotation) + 4 * firstFrame_[g] : nullptr;
+    if (model.finite()) {
+      moveSegments(group, range, h, field(Field::position), v, frames_.data() + firstFrame_[g], q);
+      if (turns) rotateOffsets(group, range, q, model.slaveOffset.data(), field(Field::offset));
+    } else if (turns) {
       for (int e = 0; e < group.segments(); ++e) {
         Vec3 spin;
         meanSpin(group, {e, e + 1}, shape.frame, v, spin.data() - 3 * static_cast<std::ptrdiff_t>(e));
@@ -389,14 +394,14 @@ void Dynamics::drift(double h, double ahead) {
     }
   });
   for (std::size_t k = 0; k < layout[Field::angle].count; ++k) field(Field::angle)[k] += h * w[k];
-  if (has(Field::position)) {
-    // Driven positions that are inputs stay as they were set.
-    const int first = drivenMove_ ? 0 : 3 * model.freeBegin();
-    const int last = drivenMove_ ? 3 * model.nodes() : 3 * model.freeEnd();
-    double* x = field(Field::position);
-    for (int k = first; k < last; ++k) x[k] += h * v[k];
+  if (!has(Field::position)) return;
+  double* x = field(Field::position);
+  if (drivenMove_) {
+    for (int k = 0; k < 3 * model.nodes(); ++k) x[k] += h * v[k];
+  } else {  // driven positions that are inputs stay as they were set
+    for (int k = 3 * model.freeBegin(); k < 3 * model.freeEnd(); ++k) x[k] += h * v[k];
+    updateGeometry();
   }
-  updateGeometry();
 }
 
 void Dynamics::rates(double* rate) {

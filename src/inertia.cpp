@@ -53,7 +53,7 @@ void lumpedAdditions(const Model& model, const double* slaveMass, const double* 
       for (int i = 0; i < n; ++i) mass[node[i]] += m / n + (own + m * d2) * lambda;
       return;
     }
-    const double* phi = &group.clamped[static_cast<std::size_t>(n) * k];
+    const Phi phi = clamped(n, &group.weight[static_cast<std::size_t>(n) * k]);
     for (int i = 0; i < n; ++i) mass[node[i]] += phi[i] * m;
     if (group.coupling == Coupling::rotation)
       for (int i = 0; i < n; ++i) inertia[node[i]] += phi[i] * (own + m * d2);
@@ -88,7 +88,7 @@ void nodalStiffness(const Model& model, double* translation, double* rotation) {
       for (int i = 0; i < n; ++i) translation[node[i]] += k[s] / n + lambda * (kr[s] + k[s] * d2);
       return;
     }
-    const double* phi = &group.clamped[static_cast<std::size_t>(n) * local];
+    const Phi phi = clamped(n, &group.weight[static_cast<std::size_t>(n) * local]);
     for (int i = 0; i < n; ++i) translation[node[i]] += phi[i] * k[s];
     if (group.coupling == Coupling::rotation)
       for (int i = 0; i < n; ++i) rotation[node[i]] += phi[i] * (kr[s] + k[s] * d2);

@@ -271,6 +271,13 @@ class Compiler {
               [&](int a, int b) { return scene.nodes.id[bonds[a].slave] < scene.nodes.id[bonds[b].slave]; });
     for (int j = 0; j < static_cast<int>(byId.size()); ++j) number[byId[j]] = j + 1;
 
+    const std::size_t count = bonds.size();
+    for (auto* v : {&model.slavePosition, &model.slaveOffset}) v->reserve(3 * count);
+    for (auto* v : {&model.slaveMass, &model.slaveInertia, &model.slaveStiffness, &model.slaveRotationalStiffness})
+      v->reserve(count);
+    model.slaveId.reserve(count);
+    model.slaveNumber.reserve(count);
+    model.slaveReport.reserve(count);
     slaveIndex.assign(scene.nodes.id.size(), -1);
     for (const SceneTie& t : scene.ties) model.tieName.push_back(t.name);
     int lastSegment = -1;
@@ -278,7 +285,7 @@ class Compiler {
       const Bond& b = bonds[s];
       if (model.groups.empty() || model.groups.back().coupling != b.coupling ||
           model.groups.back().corners != b.corners) {
-        model.groups.push_back({b.coupling, b.corners, s, {}, {0}, {}, {}});
+        model.groups.push_back({b.coupling, b.corners, s, {}, {0}, {}});
         lastSegment = -1;
       }
       TieGroup& group = model.groups.back();
@@ -290,9 +297,7 @@ class Compiler {
       }
       ++group.begin.back();
       segmentRotation.push_back(b.coupling == Coupling::meanMotion ? meanMotionSegments - 1 : -1);
-      const Phi inside = clamped(b.corners, b.projection);
       group.weight.insert(group.weight.end(), b.projection.phi.begin(), b.projection.phi.begin() + b.corners);
-      group.clamped.insert(group.clamped.end(), inside.begin(), inside.begin() + b.corners);
 
       const int node = b.slave;
       slaveIndex[node] = s;
@@ -321,6 +326,11 @@ class Compiler {
       report.lambda = inertia.lambda;
       report.clamped = b.coupling != Coupling::meanMotion && b.projection.outside > 1 + 1e-12;
       model.slaveReport.push_back(report);
+    }
+    for (TieGroup& group : model.groups) {
+      group.node.shrink_to_fit();
+      group.begin.shrink_to_fit();
+      group.weight.shrink_to_fit();
     }
   }
 

@@ -34,7 +34,6 @@ struct TieGroup {
   std::vector<int> node;        // corners per segment: independent node indices
   std::vector<int> begin;       // segments + 1: slaves of segment e are firstSlave + [begin[e], begin[e+1])
   std::vector<double> weight;   // corners per slave: Phi at the projection
-  std::vector<double> clamped;  // corners per slave: Phi at the projection clamped to the segment (masses, stiffness)
   int segments() const { return static_cast<int>(begin.size()) - 1; }
   int slaves() const { return begin.back(); }
 };

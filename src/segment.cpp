@@ -94,9 +94,14 @@ Projection project(int n, const Vec3* corner, const Vec3& slave) {
   return p;
 }
 
-Phi clamped(int n, const Projection& p) {
-  if (n == 4) return shape(4, std::clamp(p.xi, -1.0, 1.0), std::clamp(p.eta, -1.0, 1.0));
-  Phi phi = p.phi;
+Phi clamped(int n, const double* p) {
+  Phi phi{};
+  std::copy_n(p, n, phi.begin());
+  if (n == 4) {
+    const double xi = p[1] + p[2] - p[0] - p[3], eta = p[2] + p[3] - p[0] - p[1];
+    if (std::abs(xi) <= 1 && std::abs(eta) <= 1) return phi;
+    return shape(4, std::clamp(xi, -1.0, 1.0), std::clamp(eta, -1.0, 1.0));
+  }
   double sum = 0;
   for (double& w : phi) sum += (w = std::max(w, 0.0));
   for (double& w : phi) w /= sum;

@@ -27,9 +27,9 @@ struct Projection {
 // segment's size. `converged` is false where Newton does not settle.
 Projection project(int n, const Vec3* corner, const Vec3& slave);
 
-// Phi of the projection clamped to the segment: xi and eta to [-1, 1]; a triangle's negative Phi to 0, the rest scaled
-// to the sum 1, which treats its three nodes alike.
-Phi clamped(int n, const Projection& projection);
+// Phi of a projection (n entries) clamped to the segment: a quad's xi and eta to [-1, 1]; a triangle's negative Phi to
+// 0, the rest scaled to the sum 1, which treats its three nodes alike.
+Phi clamped(int n, const double* phi);
 
 // No area (coincident or collinear nodes, or a quad folded onto itself): the cross product of the diagonals (edges)
 // below 1e-12 of the longest edge squared.

@@ -9,6 +9,7 @@
 #define TIEFMU_CLONES
 #endif
 #define TIEFMU_INLINE inline __attribute__((always_inline))
+#define TIEFMU_INLINED __attribute__((always_inline))  // for lambdas: part of the clone that calls them
 
 namespace tiefmu {
 namespace {
@@ -109,7 +110,7 @@ TIEFMU_INLINE void eachSegment(const TieGroup& group, SegmentRange range, Body b
 template <int N>
 TIEFMU_INLINE void followTranslation(const TieGroup& group, SegmentRange range, const double* u, double* us) {
   const double* weight = group.weight.data() - N * static_cast<std::ptrdiff_t>(group.firstSlave);
-  eachSegment<N>(group, range, [&](int, Corners<N> corners, std::ptrdiff_t s, std::ptrdiff_t last) {
+  eachSegment<N>(group, range, [&](int, Corners<N> corners, std::ptrdiff_t s, std::ptrdiff_t last) TIEFMU_INLINED {
     Pack ui[N];
     corners.gather(u, ui);
     for (; s < last; ++s) store(us + 3 * s, weighted<N>(weight + N * s, ui));
@@ -120,7 +121,7 @@ template <int N>
 TIEFMU_INLINE void followRotation(const TieGroup& group, SegmentRange range, const double* offset, const double* u,
                                   const double* turn, double* us, double* turns) {
   const double* weight = group.weight.data() - N * static_cast<std::ptrdiff_t>(group.firstSlave);
-  eachSegment<N>(group, range, [&](int, Corners<N> corners, std::ptrdiff_t s, std::ptrdiff_t last) {
+  eachSegment<N>(group, range, [&](int, Corners<N> corners, std::ptrdiff_t s, std::ptrdiff_t last) TIEFMU_INLINED {
     Pack ui[N], wi[N];
     corners.gather(u, ui);
     corners.gather(turn, wi);
@@ -135,7 +136,7 @@ TIEFMU_INLINE void followRotation(const TieGroup& group, SegmentRange range, con
 template <int N>
 TIEFMU_INLINE void followMeanMotion(const TieGroup& group, SegmentRange range, TieGeometry geometry, const double* u,
                                     double* us, double* turns) {
-  eachSegment<N>(group, range, [&](int e, Corners<N> corners, std::ptrdiff_t s, std::ptrdiff_t last) {
+  eachSegment<N>(group, range, [&](int e, Corners<N> corners, std::ptrdiff_t s, std::ptrdiff_t last) TIEFMU_INLINED {
     Pack ui[N];
     corners.gather(u, ui);
     const Pack w = rigidSpin<N>(geometry.frame[e].arm, geometry.frame[e].inverse, ui), centre = mean<N>(ui);
@@ -149,7 +150,7 @@ TIEFMU_INLINE void followMeanMotion(const TieGroup& group, SegmentRange range, T
 template <int N>
 TIEFMU_INLINE void distributeTranslation(const TieGroup& group, SegmentRange range, const double* force, double* f) {
   const double* weight = group.weight.data() - N * static_cast<std::ptrdiff_t>(group.firstSlave);
-  eachSegment<N>(group, range, [&](int, Corners<N> corners, std::ptrdiff_t s, std::ptrdiff_t last) {
+  eachSegment<N>(group, range, [&](int, Corners<N> corners, std::ptrdiff_t s, std::ptrdiff_t last) TIEFMU_INLINED {
     Pack fi[N] = {};
     for (; s < last; ++s) {
       const Pack F = load(force + 3 * s);
@@ -163,7 +164,7 @@ template <int N>
 TIEFMU_INLINE void distributeRotation(const TieGroup& group, SegmentRange range, const double* offset,
                                       const double* force, const double* moment, double* f, double* t) {
   const double* weight = group.weight.data() - N * static_cast<std::ptrdiff_t>(group.firstSlave);
-  eachSegment<N>(group, range, [&](int, Corners<N> corners, std::ptrdiff_t s, std::ptrdiff_t last) {
+  eachSegment<N>(group, range, [&](int, Corners<N> corners, std::ptrdiff_t s, std::ptrdiff_t last) TIEFMU_INLINED {
     Pack fi[N] = {}, ti[N] = {};
     for (; s < last; ++s) {
       const Pack F = load(force + 3 * s);
@@ -181,7 +182,7 @@ TIEFMU_INLINE void distributeRotation(const TieGroup& group, SegmentRange range,
 template <int N>
 TIEFMU_INLINE void distributeMeanMotion(const TieGroup& group, SegmentRange range, TieGeometry geometry,
                                         const double* force, const double* moment, double* f) {
-  eachSegment<N>(group, range, [&](int e, Corners<N> corners, std::ptrdiff_t s, std::ptrdiff_t last) {
+  eachSegment<N>(group, range, [&](int e, Corners<N> corners, std::ptrdiff_t s, std::ptrdiff_t last) TIEFMU_INLINED {
     Pack F = {}, M = {};
     for (; s < last; ++s) {
       const Pack load1 = load(force + 3 * s);
@@ -199,7 +200,7 @@ template <int N>
 TIEFMU_INLINE void biasRotation(const TieGroup& group, SegmentRange range, const double* offset, const double* spin,
                                 double* as) {
   const double* weight = group.weight.data() - N * static_cast<std::ptrdiff_t>(group.firstSlave);
-  eachSegment<N>(group, range, [&](int, Corners<N> corners, std::ptrdiff_t s, std::ptrdiff_t last) {
+  eachSegment<N>(group, range, [&](int, Corners<N> corners, std::ptrdiff_t s, std::ptrdiff_t last) TIEFMU_INLINED {
     Pack wi[N];
     corners.gather(spin, wi);
     for (; s < last; ++s) {
@@ -213,7 +214,7 @@ TIEFMU_INLINE void biasRotation(const TieGroup& group, SegmentRange range, const
 template <int N>
 TIEFMU_INLINE void biasMeanMotion(const TieGroup& group, SegmentRange range, TieGeometry geometry, const double* v,
                                   double* as, double* zs) {
-  eachSegment<N>(group, range, [&](int e, Corners<N> corners, std::ptrdiff_t s, std::ptrdiff_t last) {
+  eachSegment<N>(group, range, [&](int e, Corners<N> corners, std::ptrdiff_t s, std::ptrdiff_t last) TIEFMU_INLINED {
     Pack vi[N];
     corners.gather(v, vi);
     const SegmentFrame& frame = geometry.frame[e];
@@ -236,7 +237,7 @@ template <int N>
 TIEFMU_INLINE void placeWeighted(const TieGroup& group, SegmentRange range, const double* offset, const double* x,
                                  double* xs) {
   const double* weight = group.weight.data() - N * static_cast<std::ptrdiff_t>(group.firstSlave);
-  eachSegment<N>(group, range, [&](int, Corners<N> corners, std::ptrdiff_t s, std::ptrdiff_t last) {
+  eachSegment<N>(group, range, [&](int, Corners<N> corners, std::ptrdiff_t s, std::ptrdiff_t last) TIEFMU_INLINED {
     Pack xi[N];
     corners.gather(x, xi);
     for (; s < last; ++s) store(xs + 3 * s, weighted<N>(weight + N * s, xi) + load(offset + 3 * s));
@@ -246,7 +247,7 @@ TIEFMU_INLINE void placeWeighted(const TieGroup& group, SegmentRange range, cons
 template <int N>
 TIEFMU_INLINE void placeMeanMotion(const TieGroup& group, SegmentRange range, const double* offset, const double* x,
                                    double* xs) {
-  eachSegment<N>(group, range, [&](int, Corners<N> corners, std::ptrdiff_t s, std::ptrdiff_t last) {
+  eachSegment<N>(group, range, [&](int, Corners<N> corners, std::ptrdiff_t s, std::ptrdiff_t last) TIEFMU_INLINED {
     Pack xi[N];
     corners.gather(x, xi);
     const Pack centre = mean<N>(xi);
@@ -258,9 +259,9 @@ TIEFMU_INLINE void placeMeanMotion(const TieGroup& group, SegmentRange range, co
 TIEFMU_INLINE Pack rotated(Pack angle, Pack d) {
   const double a2 = dot(angle, angle);
   double s, c;
-  if (a2 < 0.1) {  // the terms left out are below 1e-17
-    s = 1 - a2 / 6 * (1 - a2 / 20 * (1 - a2 / 42 * (1 - a2 / 72 * (1 - a2 / 110))));
-    c = 0.5 * (1 - a2 / 12 * (1 - a2 / 30 * (1 - a2 / 56 * (1 - a2 / 90 * (1 - a2 / 132)))));
+  if (a2 < 1e-3) {  // a step of 2 degrees; the terms left out are below 1e-17
+    s = 1 - a2 * (1.0 / 6) * (1 - a2 * (1.0 / 20) * (1 - a2 * (1.0 / 42)));
+    c = 0.5 * (1 - a2 * (1.0 / 12) * (1 - a2 * (1.0 / 30) * (1 - a2 * (1.0 / 56))));
   } else {
     const double a = std::sqrt(a2), half = std::sin(0.5 * a);
     s = std::sin(a) / a;
@@ -274,7 +275,7 @@ template <int N>
 TIEFMU_INLINE void turnOffsetsN(const TieGroup& group, SegmentRange range, double h, const double* spin,
                                 const double* inverseLength2, double* offset) {
   const double* weight = group.weight.data() - N * static_cast<std::ptrdiff_t>(group.firstSlave);
-  eachSegment<N>(group, range, [&](int, Corners<N> corners, std::ptrdiff_t s, std::ptrdiff_t last) {
+  eachSegment<N>(group, range, [&](int, Corners<N> corners, std::ptrdiff_t s, std::ptrdiff_t last) TIEFMU_INLINED {
     Pack wi[N];
     corners.gather(spin, wi);
     for (int i = 0; i < N; ++i) wi[i] *= h;
@@ -287,23 +288,30 @@ TIEFMU_INLINE void turnOffsetsN(const TieGroup& group, SegmentRange range, doubl
 }
 
 template <int N>
-TIEFMU_INLINE void turnSegmentsN(const TieGroup& group, SegmentRange range, double h, const double* x, const double* v,
-                                 double* rotation) {
-  eachSegment<N>(group, range, [&](int e, Corners<N> corners, std::ptrdiff_t, std::ptrdiff_t) {
+TIEFMU_INLINE void moveSegmentsN(const TieGroup& group, SegmentRange range, double h, const double* x, const double* v,
+                                 SegmentFrame* frame, double* rotation) {
+  eachSegment<N>(group, range, [&](int e, Corners<N> corners, std::ptrdiff_t, std::ptrdiff_t) TIEFMU_INLINED {
     Pack xi[N], vi[N];
     corners.gather(x, xi);
     corners.gather(v, vi);
     for (int i = 0; i < N; ++i) xi[i] += (0.5 * h) * vi[i];
-    SegmentFrame frame;
-    frameOf<N>(xi, frame);
-    const Pack w = h * rigidSpin<N>(frame.arm, frame.inverse, vi);
-    double* q = rotation + 4 * static_cast<std::ptrdiff_t>(e);
-    const Quat next = exponential(Vec3(w[0], w[1], w[2])) * Quat(q[0], q[1], q[2], q[3]);
-    const double scale = 1.5 - 0.5 * next.squaredNorm();
-    q[0] = scale * next.w();
-    q[1] = scale * next.x();
-    q[2] = scale * next.y();
-    q[3] = scale * next.z();
+    if (rotation) {
+      SegmentFrame middle;
+      frameOf<N>(xi, middle);
+      const Pack u = (0.5 * h) * rigidSpin<N>(middle.arm, middle.inverse, vi);
+      // q <- (1, u) q, scaled to unit length
+      double* q = rotation + 4 * static_cast<std::ptrdiff_t>(e);
+      const double a = q[0], b = q[1], c = q[2], d = q[3];
+      const double w = a - u[0] * b - u[1] * c - u[2] * d, i = b + u[0] * a + u[1] * d - u[2] * c,
+                   j = c + u[1] * a + u[2] * b - u[0] * d, k = d + u[2] * a + u[0] * c - u[1] * b;
+      const double scale = 1 / std::sqrt(w * w + i * i + j * j + k * k);
+      q[0] = scale * w;
+      q[1] = scale * i;
+      q[2] = scale * j;
+      q[3] = scale * k;
+    }
+    for (int i = 0; i < N; ++i) xi[i] += (0.5 * h) * vi[i];
+    frameOf<N>(xi, frame[e]);
   });
 }
 
@@ -369,9 +377,9 @@ TIEFMU_CLONES void place(const TieGroup& group, SegmentRange range, TieGeometry 
 
 TIEFMU_CLONES void updateFrames(const TieGroup& group, SegmentRange range, const double* position,
                                 SegmentFrame* frame) {
-  const auto update = [&](auto n) {
+  const auto update = [&](auto n) TIEFMU_INLINED {
     constexpr int N = decltype(n)::value;
-    eachSegment<N>(group, range, [&](int e, Corners<N> corners, std::ptrdiff_t, std::ptrdiff_t) {
+    eachSegment<N>(group, range, [&](int e, Corners<N> corners, std::ptrdiff_t, std::ptrdiff_t) TIEFMU_INLINED {
       Pack x[N];
       corners.gather(position, x);
       frameOf<N>(x, frame[e]);
@@ -387,10 +395,10 @@ TIEFMU_CLONES void turnOffsets(const TieGroup& group, SegmentRange range, double
                             : turnOffsetsN<3>(group, range, h, spin, inverseLength2, offset);
 }
 
-TIEFMU_CLONES void turnSegments(const TieGroup& group, SegmentRange range, double h, const double* position,
-                                const double* velocity, double* rotation) {
-  return group.corners == 4 ? turnSegmentsN<4>(group, range, h, position, velocity, rotation)
-                            : turnSegmentsN<3>(group, range, h, position, velocity, rotation);
+TIEFMU_CLONES void moveSegments(const TieGroup& group, SegmentRange range, double h, const double* position,
+                                const double* velocity, SegmentFrame* frame, double* rotation) {
+  return group.corners == 4 ? moveSegmentsN<4>(group, range, h, position, velocity, frame, rotation)
+                            : moveSegmentsN<3>(group, range, h, position, velocity, frame, rotation);
 }
 
 TIEFMU_CLONES void rotateOffsets(const TieGroup& group, SegmentRange range, const double* rotation,
@@ -410,9 +418,9 @@ TIEFMU_CLONES void rotateOffsets(const TieGroup& group, SegmentRange range, cons
 
 TIEFMU_CLONES void meanSpin(const TieGroup& group, SegmentRange range, const SegmentFrame* frame,
                             const double* velocity, double* spin) {
-  const auto compute = [&](auto n) {
+  const auto compute = [&](auto n) TIEFMU_INLINED {
     constexpr int N = decltype(n)::value;
-    eachSegment<N>(group, range, [&](int e, Corners<N> corners, std::ptrdiff_t, std::ptrdiff_t) {
+    eachSegment<N>(group, range, [&](int e, Corners<N> corners, std::ptrdiff_t, std::ptrdiff_t) TIEFMU_INLINED {
       Pack v[N];
       corners.gather(velocity, v);
       store(spin + 3 * static_cast<std::ptrdiff_t>(e), rigidSpin<N>(frame[e].arm, frame[e].inverse, v));

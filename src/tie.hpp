@@ -54,10 +54,12 @@ void updateFrames(const TieGroup& group, SegmentRange range, const double* posit
 void turnOffsets(const TieGroup& group, SegmentRange range, double h, const double* spin, const double* inverseLength2,
                  double* offset);
 
-// Rotation of meanMotion segments advanced by exp(h w), w taken at mid step from nodes moving with `velocity`.
-// `rotation`: unit quaternion (w, x, y, z) per segment.
-void turnSegments(const TieGroup& group, SegmentRange range, double h, const double* position, const double* velocity,
-                  double* rotation);
+// meanMotion segments over a step in which their nodes move from `position` by h `velocity`: the frames at its end, and
+// (unless null) the rotation, a unit quaternion (w, x, y, z) per segment. The rotation is the Cayley map of h w / 2, w
+// at mid step: of all second-order choices the one that turns with a segment that rotates rigidly exactly, since its
+// nodes then move by 2 tan(angle / 2) n x r_mid.
+void moveSegments(const TieGroup& group, SegmentRange range, double h, const double* position, const double* velocity,
+                  SegmentFrame* frame, double* rotation);
 
 // d = R d0 for the slaves of meanMotion segments.
 void rotateOffsets(const TieGroup& group, SegmentRange range, const double* rotation, const double* initialOffset,

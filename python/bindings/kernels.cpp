@@ -85,7 +85,7 @@ void bindKernels(nb::module_& parent) {
     std::vector<std::uint8_t> converged;
     for (std::size_t s = 0; s < count; ++s) {
       const Projection p = project(n, x, at(points.data(), static_cast<Eigen::Index>(s)));
-      const Phi inside = clamped(n, p);
+      const Phi inside = clamped(n, p.phi.data());
       local.insert(local.end(), {p.xi, p.eta});
       phi.insert(phi.end(), p.phi.begin(), p.phi.begin() + n);
       clamp.insert(clamp.end(), inside.begin(), inside.begin() + n);
@@ -169,7 +169,6 @@ void bindKernels(nb::module_& parent) {
         g.slaves = static_cast<std::size_t>(g.tie.begin.back());
         wants(weight, g.slaves * g.tie.corners, "weight");
         g.tie.weight.assign(weight.data(), weight.data() + weight.size());
-        g.tie.clamped = g.tie.weight;
         g.frames.resize(g.tie.segments());
         g.offset.resize(3 * g.slaves);
         new (self) Group(std::move(g));
@@ -218,7 +217,7 @@ void bindKernels(nb::module_& parent) {
         lumpedAdditions(model, mass.data(), inertia.data(), m.data(), j.data());
         return std::pair{array(std::move(m), {g.nodes}), array(std::move(j), {g.nodes})};
       }, "positions"_a, "mass"_a, "inertia"_a,
-         "D: mass (kg) and inertia (kg m2) added per node; the weights given stand for the clamped ones.");
+         "D: mass (kg) and inertia (kg m2) added per node.");
 
   m.def("stable_step", [](const std::string& method, double omega, double c) {
     for (const auto& [name, value] : {std::pair{"central-difference", Method::centralDifference},

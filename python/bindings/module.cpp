@@ -12,6 +12,7 @@
 #include <unordered_map>
 
 #include "resource.hpp"
+#include "segment.hpp"
 #include "simulation.hpp"
 #include "variables.hpp"
 #include "xml.hpp"
@@ -202,10 +203,11 @@ nb::dict reportSlaves(const Model& model) {
         const std::size_t s = static_cast<std::size_t>(g.firstSlave) + k;
         coupling[s] = static_cast<std::int32_t>(g.coupling);
         corners[s] = g.corners;
+        const Phi clampedPhi = tiefmu::clamped(g.corners, &g.weight[corner * k]);
         for (std::size_t i = 0; i < corner; ++i) {
           node[4 * s + i] = model.nodeId[static_cast<std::size_t>(g.node[corner * e + i])];
           weight[4 * s + i] = g.weight[corner * k + i];
-          inside[4 * s + i] = g.clamped[corner * k + i];
+          inside[4 * s + i] = clampedPhi[i];
         }
       }
   }
