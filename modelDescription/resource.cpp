@@ -195,7 +195,7 @@ void field(Archive& a, Model& m) {
     field(a, *v);
   field(a, m.slaveId);
   field(a, m.slaveNumber);
-  for (auto* v : {&m.slavePosition, &m.slaveOffset, &m.slaveMass, &m.slaveInertia, &m.slaveStiffness,
+  for (auto* v : {&m.slaveOffset, &m.slaveMass, &m.slaveInertia, &m.slaveStiffness,
                   &m.slaveRotationalStiffness})
     field(a, *v);
   field(a, m.turningSlaves);
@@ -257,13 +257,12 @@ void checkSlaves(const Model& m) {
   require(slaves < (std::size_t{1} << 31), "number of slaves");
   require(m.turningSlaves >= 0 && static_cast<std::size_t>(m.turningSlaves) <= slaves, "turning slaves");
   requireSize(m.slaveNumber, slaves, "slave numbers");
-  requireSize(m.slavePosition, 3 * slaves, "slave positions");
   requireSize(m.slaveOffset, 3 * slaves, "slave offsets");
   requireSize(m.slaveMass, slaves, "slave masses");
   requireSize(m.slaveInertia, slaves, "slave inertias");
   requireSize(m.slaveStiffness, slaves, "slave stiffnesses");
   requireSize(m.slaveRotationalStiffness, slaves, "rotational slave stiffnesses");
-  for (const auto* v : {&m.slavePosition, &m.slaveOffset, &m.slaveMass, &m.slaveInertia, &m.slaveStiffness,
+  for (const auto* v : {&m.slaveOffset, &m.slaveMass, &m.slaveInertia, &m.slaveStiffness,
                         &m.slaveRotationalStiffness})
     requireFinite(*v, "slave numbers that are not finite");
   for (int number : m.slaveNumber) require(number >= 1, "slave numbers");

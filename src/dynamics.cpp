@@ -176,9 +176,11 @@ void Dynamics::placeSlaves(double* xs, bool sprungOnly) {
     for (std::size_t k = 0; k < displacement_.size(); ++k) displacement_[k] = x[k] - model.nodePosition[k];
   const auto body = [&](const TieGroup& group, SegmentRange range, TieGeometry shape, std::size_t) {
     if (model.finite()) return place(group, range, shape, x, xs);
-    follow(group, range, shape, displacement_.data(), field(Field::angle), xs, ws_.data());
+    // x_s = X_s + T (x - X): the start position, then the displacement on top.
+    follow(group, range, shape, displacement_.data(), field(Field::angle), vs_.data(), ws_.data());
+    place(group, range, shape, model.nodePosition.data(), xs);
     for (int k = 3 * (group.firstSlave + group.begin[range.first]); k < 3 * (group.firstSlave + group.begin[range.last]); ++k)
-      xs[k] += model.slavePosition[k];
+      xs[k] += vs_[k];
   };
   if (sprungOnly) eachSprung(body);
   else eachGroup(body);

@@ -152,6 +152,12 @@ class Compiler {
   void chooseCouplings() {
     bound.assign(scene.nodes.id.size(), 0);
     master.assign(scene.nodes.id.size(), 0);
+    struct StillOffsets {
+      int count = 0;
+      double largest = 0;
+      const Bond* bond = nullptr;
+    };
+    std::vector<StillOffsets> stillOffsets(scene.ties.size());
     std::vector<std::uint8_t> toldCondition(scene.segments.id.size(), 0), toldRotations = toldCondition;
     for (Bond& b : bonds) {
       bound[b.slave] = 1;
@@ -186,14 +192,23 @@ class Compiler {
         warn(onSegment + "counts as without rotations: nodes " + turning + " have them, nodes " + still + " do not");
       }
       const double size = (x[2] - x[0]).norm(), d = b.offset.norm();
-      if (d > offsetNegligible * size)
-        warn(where + "offset d = " + text(d) + " m from segment " + segmentId(b.segment) +
-             ", whose nodes have no rotations: the offset never turns and the moment d x F is lost; "
-             "formulation = \"optimized\" carries both");
+      if (d > offsetNegligible * size) {
+        StillOffsets& still1 = stillOffsets[b.tie];
+        if (still1.count++ == 0 || d > still1.largest) {
+          still1.largest = d;
+          still1.bond = &b;
+        }
+      }
       if (scene.nodes.inertia[b.slave] > 0)
         throw SceneError(where + "has rotary inertia, but the nodes of segment " + segmentId(b.segment) +
                          " have no rotations to carry it; use formulation = \"optimized\" or rotations = true");
     }
+    for (const StillOffsets& s : stillOffsets)
+      if (s.count > 0)
+        warn(tie(s.bond->tie) + "slave " + id(s.bond->slave) + ": offset d = " + text(s.largest) + " m from segment " +
+             segmentId(s.bond->segment) + ", whose nodes have no rotations" +
+             (s.count > 1 ? " (the largest of " + std::to_string(s.count) + " such slaves)" : "") +
+             ": the offset never turns and the moment d x F is lost; formulation = \"optimized\" carries both");
   }
 
   // The rotational freedoms that the model keeps: those of free nodes that nothing turns and nothing resists are left
@@ -272,7 +287,7 @@ class Compiler {
     for (int j = 0; j < static_cast<int>(byId.size()); ++j) number[byId[j]] = j + 1;
 
     const std::size_t count = bonds.size();
-    for (auto* v : {&model.slavePosition, &model.slaveOffset}) v->reserve(3 * count);
+    model.slaveOffset.reserve(3 * count);
     for (auto* v : {&model.slaveMass, &model.slaveInertia, &model.slaveStiffness, &model.slaveRotationalStiffness})
       v->reserve(count);
     model.slaveId.reserve(count);
@@ -304,26 +319,18 @@ class Compiler {
       if (b.coupling != Coupling::translation) model.turningSlaves = s + 1;
       model.slaveId.push_back(scene.nodes.id[node]);
       model.slaveNumber.push_back(number[s]);
-      const Vec3& x = scene.nodes.position[node];
-      model.slavePosition.insert(model.slavePosition.end(), x.begin(), x.end());
       model.slaveOffset.insert(model.slaveOffset.end(), b.offset.begin(), b.offset.end());
       model.slaveMass.push_back(scene.nodes.mass[node]);
       model.slaveInertia.push_back(scene.nodes.inertia[node]);
       model.slaveStiffness.push_back(scene.nodes.stiffness[node]);
       model.slaveRotationalStiffness.push_back(scene.nodes.rotationalStiffness[node]);
 
-      Vec3 corner[4];
-      const NodeInertia inertia = nodeInertia(gather(b.segment, corner), corner);
       SlaveReport report;
-      report.id = scene.nodes.id[node];
       report.tie = b.tie;
       report.segment = scene.segments.id[b.segment];
       report.xi = b.projection.xi;
       report.eta = b.projection.eta;
       report.distance = b.projection.distance;
-      report.offset = b.offset.norm();
-      report.condition = inertia.condition;
-      report.lambda = inertia.lambda;
       report.clamped = b.coupling != Coupling::meanMotion && b.projection.outside > 1 + 1e-12;
       model.slaveReport.push_back(report);
     }

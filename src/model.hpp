@@ -68,15 +68,11 @@ struct Dropped {  // a slave that its tie's search did not find
 };
 
 struct SlaveReport {
-  std::int64_t id = 0;
-  int tie = 0;
   std::int64_t segment = 0;  // id
   double xi = 0, eta = 0;
   double distance = 0;       // slave to its projection, m
-  double offset = 0;         // d: to the projection (default) or the barycentre (optimized), m
-  double condition = 0;      // cond(Ibar) of the segment
-  double lambda = 0;         // 1/m2
-  bool clamped = false;
+  int tie = 0;
+  bool clamped = false;      // its inertia uses the projection clamped to the segment
 };
 
 struct Model {
@@ -93,7 +89,6 @@ struct Model {
   // slaves: turning ones (rotation, meanMotion) first
   std::vector<std::int64_t> slaveId;
   std::vector<int> slaveNumber;            // j of slave[j]: from 1 by ascending id
-  std::vector<double> slavePosition;       // 3 per slave
   std::vector<double> slaveOffset;         // 3 per slave: d at the start
   std::vector<double> slaveMass, slaveInertia, slaveStiffness, slaveRotationalStiffness;
   int turningSlaves = 0;                   // how many can turn

@@ -28,7 +28,7 @@ struct Simulation::Impl {
   Dynamics dynamics;
   Integrator integrator;
   Spectrum spectrum;
-  std::vector<double> backup;  // of what a step changes: the fields acceleration .. bounds
+  std::vector<double> backup;  // of what a step changes and cannot compute anew: the fields velocity .. bounds
   double time = 0;
   std::int64_t substeps = 0;
   std::uint32_t flags = 0;
@@ -44,7 +44,7 @@ struct Simulation::Impl {
     energy = layout[Field::energy].count > 0;
     for (Field f : {Field::position, Field::segmentRotation, Field::orientation, Field::angle})
       integrates |= layout[f].count > 0;
-    if (model->anyFree()) backup.resize(layout[Field::slaveVelocity].offset - layout[Field::acceleration].offset);
+    if (model->anyFree()) backup.resize(layout[Field::slaveVelocity].offset - layout[Field::velocity].offset);
     for (int s = 0; s < 3 * model->turning(); ++s) integrates |= model->finite() && model->slaveOffset[s] != 0;
   }
 
@@ -251,11 +251,10 @@ void Simulation::step(double duration) {
     s.loadsOld = s.outputsOld = true;
     return;
   }
-  double* const state = s.field(Field::acceleration);
+  double* const state = s.field(Field::velocity);
   std::copy_n(state, s.backup.size(), s.backup.begin());
   const double time = s.time;
   const std::int64_t substeps = s.substeps;
-  const std::uint32_t flags = s.flags;
   s.outputsOld = true;
   try {
     s.integrate(duration);
@@ -263,7 +262,7 @@ void Simulation::step(double duration) {
     std::copy(s.backup.begin(), s.backup.end(), state);
     s.time = time;
     s.substeps = substeps;
-    s.flags = flags;
+    s.flags &= ~accelerationsValid;
     s.geometryOld = s.loadsOld = true;
     throw;
   }

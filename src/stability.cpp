@@ -85,6 +85,7 @@ double nodalStep(const Model& model, const double* addedMass, const double* adde
 Spectrum::Spectrum(Dynamics& dynamics)
     : dynamics_(dynamics), size_(3 * (dynamics.model.free() + dynamics.model.rotating() - dynamics.model.freeBegin())) {
   const Model& model = dynamics.model;
+  if (model.springs.empty()) return;
   u_.resize(3 * static_cast<std::size_t>(model.nodes()));
   f_.resize(u_.size());
   turn_.resize(3 * static_cast<std::size_t>(model.rotating()));

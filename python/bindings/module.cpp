@@ -191,14 +191,15 @@ nb::dict reportSlaves(const Model& model) {
     xi[s] = r.xi;
     eta[s] = r.eta;
     distance[s] = r.distance;
-    length[s] = r.offset;
-    condition[s] = r.condition;
-    lambda[s] = r.lambda;
+    length[s] = at(model.slaveOffset.data(), static_cast<Eigen::Index>(s)).norm();
     clamped[s] = r.clamped;
   }
   for (const TieGroup& g : model.groups) {
     const std::size_t corner = static_cast<std::size_t>(g.corners);
-    for (std::size_t e = 0; e + 1 < g.begin.size(); ++e)
+    for (std::size_t e = 0; e + 1 < g.begin.size(); ++e) {
+      Vec3 x[4];
+      for (std::size_t i = 0; i < corner; ++i) x[i] = at(model.nodePosition.data(), g.node[corner * e + i]);
+      const NodeInertia inertia = nodeInertia(g.corners, x);
       for (std::size_t k = static_cast<std::size_t>(g.begin[e]); k < static_cast<std::size_t>(g.begin[e + 1]); ++k) {
         const std::size_t s = static_cast<std::size_t>(g.firstSlave) + k;
         coupling[s] = static_cast<std::int32_t>(g.coupling);
@@ -209,7 +210,10 @@ nb::dict reportSlaves(const Model& model) {
           weight[4 * s + i] = g.weight[corner * k + i];
           inside[4 * s + i] = clampedPhi[i];
         }
+        condition[s] = inertia.condition;
+        lambda[s] = inertia.lambda;
       }
+    }
   }
   nb::dict d;
   d["id"] = numpy(model.slaveId);
