@@ -135,12 +135,11 @@ def run_run(options):
             scene = load(options.model)
             fmu = build(scene, Path(folder) / f"{scene.name}.fmu")
         result = run(fmu, options.stop_time, options.step, options.input, name=options.model)
-        units = units_of(fmu) if options.plot else {}
     if options.output:
         write_outputs(result, options.output)
     if options.plot:
         from .plot import plot
-        plot(result, options.plot, Path(options.model).stem, units)
+        plot(result, options.plot, Path(options.model).stem)
     outputs = result.dtype.names[1:]
     print(f"{options.model}: {len(result) - 1} steps to t = {result['time'][-1]:g} s, {len(outputs)} outputs"
           + "".join(f", wrote {path}" for path in (options.output, options.plot) if path))
@@ -150,14 +149,6 @@ def run_run(options):
                   f"at the end {result[name][-1]:.6g}")
         if len(outputs) > 20:
             print(f"  ... and {len(outputs) - 20} more (--output writes all)")
-
-
-def units_of(fmu: Path) -> dict[str, str]:
-    """Variable -> unit, from the model description."""
-    import fmpy
-    description = fmpy.read_model_description(str(fmu), validate=False)
-    return {variable.name: variable.unit or (variable.declaredType.unit if variable.declaredType else None) or ""
-            for variable in description.modelVariables}
 
 
 def run_demo(options):

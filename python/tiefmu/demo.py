@@ -11,7 +11,7 @@ from .package import build
 from .plot import plot
 from .report import report
 from .run import run, write_outputs
-from .scene import Scene, load
+from .scene import load
 
 SCENES = Path(__file__).resolve().parents[2] / "scenes"  # of the checkout
 
@@ -49,7 +49,7 @@ def demo(out: Path, scenes: Path = SCENES) -> bool:
         result = run(fmu, inputs=inputs if inputs.is_file() else None)
         ran = time.perf_counter()
         write_outputs(result, out / f"{path.stem}.csv")
-        plot(result, out / f"{path.stem}.png", scene.title or path.stem, output_units(scene))
+        plot(result, out / f"{path.stem}.png", scene.title or path.stem)
         found = report(scene)
         checks = check(result)
         held = held and all(one.held for one in checks)
@@ -60,18 +60,6 @@ def demo(out: Path, scenes: Path = SCENES) -> bool:
                           for one in checks), flush=True)
     print(f"{'all checks held' if held else 'A CHECK FAILED'}; FMUs, results and pictures are in {out}")
     return held
-
-
-def output_units(scene: Scene) -> dict[str, str]:
-    """Output name -> unit."""
-    units = {}
-    for block in scene.start.variables:
-        for number in block["numbers"].tolist():
-            name = block["name"] if not block["prefix"] else \
-                f"{block['prefix']}[{number}]{block['name'][len(block['prefix']):]}"
-            for k in range(block["components"]):
-                units[f"{name}[{k + 1}]" if block["components"] > 1 else name] = block["unit"]
-    return units
 
 
 def check(result: np.ndarray) -> list[Check]:

@@ -28,7 +28,7 @@ def build(scene: Scene, path) -> Path:
     try:
         with zipfile.ZipFile(part, "w", zipfile.ZIP_DEFLATED) as archive:
             for name, data in sorted(contents(scene).items()):
-                archive.writestr(entry(name), data)
+                archive.writestr(entry(name), data, compresslevel=3)  # a third of the time of 6, 15 % more bytes
         part.replace(path)
     except OSError as error:
         raise SceneError(f"{path}: {error.strerror}") from None
@@ -40,19 +40,21 @@ def build(scene: Scene, path) -> Path:
 def contents(scene: Scene) -> dict[str, bytes]:
     """Path in the archive -> bytes."""
     identifier = _core.model_identifier(scene.name)
-    guid = model_guid(scene)
+    xml = scene.model.xml(scene.name, scene.title, "")
+    guid = model_guid(scene, xml)
     return {
-        "modelDescription.xml": scene.model.xml(scene.name, scene.title, guid),
+        # put in by hand, because large models take a while to describe twice
+        "modelDescription.xml": xml.replace(b'guid=""', f'guid="{guid}"'.encode(), 1),
         f"binaries/{PLATFORM}/{identifier}{SUFFIX}": binary(),
         "resources/scene.bin": scene.model.resource(guid),
         "resources/report.json": json.dumps(report(scene), allow_nan=False).encode(),
     }
 
 
-def model_guid(scene: Scene) -> str:
-    """Changes with everything the FMU's user could notice, and with nothing else."""
+def model_guid(scene: Scene, xml: bytes) -> str:
+    """Changes with everything the FMU's user could notice, and with nothing else. xml: with an empty guid."""
     digest = hashlib.sha256(version("tiefmu").encode())
-    digest.update(scene.model.xml(scene.name, scene.title, ""))
+    digest.update(xml)
     digest.update(scene.model.resource(""))
     return f"{{{uuid.UUID(bytes=digest.digest()[:16])}}}"
 

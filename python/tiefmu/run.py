@@ -21,7 +21,8 @@ class RunError(Exception):
 
 def run(fmu: Path, stop_time: float | None = None, step: float | None = None, inputs: Path | None = None,
         name: str | None = None) -> np.ndarray:
-    """Runs the FMU and returns its outputs: a structured array with `time` (s) and one column an output.
+    """Runs the FMU and returns its outputs: a structured array with `time` (s) and one column an output,
+    and FMPy's description of the FMU as `.modelDescription`.
 
     stop_time, s: by default the end of the input CSV, else the FMU's default experiment. step: communication step, s,
     by default the FMU's, but so small that the run has at least STEPS. inputs: CSV with `time` and names of inputs, linear in between; a time given twice is a jump.
@@ -47,6 +48,8 @@ def run(fmu: Path, stop_time: float | None = None, step: float | None = None, in
     if step is None:
         step = min((stop_time - start) / STEPS, number(experiment and experiment.stepSize, np.inf))
 
+    # A set, because FMPy asks for each variable whether it is among them.
+    outputs = frozenset(variable.name for variable in description.modelVariables if variable.causality == "output")
     said = []
 
     def log(environment, instance, status, category, message):
@@ -69,7 +72,7 @@ def run(fmu: Path, stop_time: float | None = None, step: float | None = None, in
             with contextlib.redirect_stdout(io.StringIO()):  # FMPy prints a line for each input that gets no column
                 return fmpy.simulate_fmu(folder, validate=False, model_description=description,
                                          fmi_type="CoSimulation", start_time=start, stop_time=stop_time,
-                                         output_interval=step, input=signals, logger=log,
+                                         output_interval=step, input=signals, output=outputs, logger=log,
                                          step_finished=step_finished)
         except Exception as error:
             raise RunError(f"{name}: stopped at t = {reached:g} s: {one_line(said[-1] if said else error)}") from None
