@@ -190,6 +190,7 @@ def find(position, segments, ids, points, method, reach, tie=1e-9):
             rated = [e for e in usable if held & set(segments[e])]
         else:
             rank = np.where(outside[k] <= 1 + tie, distance[k], nearest[k])
+            rank[outside[k] > 1.5] = np.inf  # no candidate: a slave that far outside is not found there
             best = rank.min()
             rated = [e for e in usable if best <= reach and rank[e] <= best + slack]
         least = min((outside[k, e] for e in rated), default=np.inf)
@@ -223,10 +224,19 @@ def rotation_vector(q):
     return 2 * q[1:] if sine < 1e-9 else 2 * np.arctan2(sine, q[0]) / sine * q[1:]
 
 
+def quaternion_product(a, b):
+    return np.concatenate([[a[0] * b[0] - a[1:] @ b[1:]], a[0] * b[1:] + b[0] * a[1:] + np.cross(a[1:], b[1:])])
+
+
 def relative(q1, q2):
     """Quaternion of R1 R2^T."""
-    a, b = q1, q2 * np.array([1, -1, -1, -1])
-    return np.concatenate([[a[0] * b[0] - a[1:] @ b[1:]], a[0] * b[1:] + b[0] * a[1:] + np.cross(a[1:], b[1:])])
+    return quaternion_product(q1, q2 * np.array([1, -1, -1, -1]))
+
+
+def exponential(angle):
+    """Quaternion of a rotation vector."""
+    half = np.linalg.norm(angle) / 2
+    return np.concatenate([[np.cos(half)], np.sinc(half / np.pi) * angle / 2])
 
 
 class Spring:
@@ -322,7 +332,7 @@ class Problem:
         self.motion = np.array([about[i].get("motion", "driven") for i in self.ids])
         self.v0, self.w0 = np.zeros_like(self.x0), np.zeros_like(self.x0)
         for table in scene.get("initial", []):
-            for i in pick(table["nodes"], self.ids):
+            for i in set(pick(table["nodes"], self.ids)) & set(self.ids):
                 self.v0[self.index[i]] = table.get("v", [0, 0, 0])
                 self.w0[self.index[i]] = table.get("w", [0, 0, 0])
         self.slaves = [self._slave(f, about[f[0]], where[f[0]]) for f in found]
@@ -476,12 +486,11 @@ class Problem:
         if free.any():
             a[free] = np.linalg.solve(m[np.ix_(free, free)], (right - m[:, ~free] @ a[~free])[free])
         loads = tmap.T @ slave_load.ravel()
-        if consistent:
-            full = loads - tmap.T @ (ms * (tmap @ a + bias))
-            kinetic = 0.5 * (self.node_masses() @ np.hstack([v, w]).ravel() ** 2 + ms @ twist.ravel() ** 2)
-        else:
-            full = loads - self.added_masses() * a
-            kinetic = 0.5 * (self.node_masses() + self.added_masses()) @ np.hstack([v, w]).ravel() ** 2
+        inertial = tmap.T @ (ms * (tmap @ a + bias)) if consistent else self.added_masses() * a
+        full = loads - inertial
+        # the true energy, with the slaves' own; lumped inertia conserves another one
+        moving = self.node_masses() * np.repeat(self.motion == "free", 6)
+        kinetic = 0.5 * (moving @ np.hstack([v, w]).ravel() ** 2 + ms @ twist.ravel() ** 2)
         reaction = {"loads": loads, "full": full, "split": full + self.added_masses() * a}
         return {"x": x, "v": v, "w": w, "a": a.reshape(-1, 6), "slave_x": place, "slave_v": twist[:, :3],
                 "slave_w": twist[:, 3:], "slave_a": (tmap @ a + bias).reshape(-1, 6), "d": d, "T": tmap, "b": bias,

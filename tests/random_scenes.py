@@ -31,8 +31,12 @@ def slave_over(rng, corners, outside=1.4, offset=5.0):
         a, b = shape_gradient(n, xi, eta) @ corners
         normal = np.cross(a, b) / np.linalg.norm(np.cross(a, b))
         point = shape(n, xi, eta) @ corners + rng.choice([0, 1]) * rng.uniform(-offset, offset) * edge * normal
-        # on a warped quad a far point has several closest ones; wanted is the one that Newton finds from the centre
-        if n == 3 or np.abs(local_coordinates(corners[None], point[None])[0] - (xi, eta)).max() < 1e-9:
+        # A far point of a warped quad can have several closest ones, or lie near a focal point where none is well
+        # defined; wanted is one that Newton finds from the centre, with a curvature term that leaves it well defined.
+        first = np.array([a, b]) @ np.array([a, b]).T
+        cross = (shape(n, xi, eta) @ corners - point) @ (0.25 * np.array([1, -1, 1, -1]) @ corners) if n == 4 else 0
+        well_defined = abs(cross) < 0.8 * np.sqrt(np.linalg.det(first)) * np.linalg.det(first) / np.prod(np.diag(first))
+        if n == 3 or well_defined and np.abs(local_coordinates(corners[None], point[None])[0] - (xi, eta)).max() < 1e-9:
             return point
 
 
@@ -77,7 +81,7 @@ def patch(rng, columns=3, rows_=3, size=1.0, warp=0.1, triangles=0.3):
     return position, segments
 
 
-def structure(rng, formulation="default", rotations=True, inertia="consistent", gap=0.3, slaves=4, spin=0.0):
+def structure(rng, formulation="default", rotations=True, inertia="consistent", gap=0.3, slaves=4, speed=1.0):
     """A free patch on ground bushings with slaves, one of which carries a bushing to a free point (node 301)."""
     position, segments = patch(rng, 2, 2)
     count = len(position)
@@ -98,8 +102,10 @@ def structure(rng, formulation="default", rotations=True, inertia="consistent", 
     spring = [{"ground": list(range(1, count + 1)), "kind": "bushing", "stiffness": 200.0, **held},
               {"nodes": [slave_ids[0], 301], "kind": "bushing", "stiffness": 150.0, **turning},
               {"nodes": [slave_ids[-1], 301], "kind": "axial", "stiffness": 100.0}]
-    initial = [{"nodes": [i], "v": rng.uniform(-1, 1, 3).tolist()} | ({"w": rng.uniform(-1, 1, 3).tolist()} if rotations
-               else {}) for i in range(1, count + 1)]
+    initial = []
+    for i in range(1, count + 1):
+        v, w = rng.uniform(-speed, speed, (2, 3)).tolist()
+        initial.append({"nodes": [i], "v": v} | ({"w": w} if rotations else {}))
     return {
         "mesh": {"nodes": rows(1, position) + rows(101, points) + rows(301, [points[0] + [0.1, 0.2, 0.5]]),
                  "segments": segments},

@@ -59,9 +59,9 @@ def test_heave_and_roll(inertia, pattern, omega2):
     run = Run(on_springs(inertia, pattern))
     omega = np.sqrt(omega2)
     for k in range(1, 11):
-        run.step(0.05, 1)
+        run.step(0.002, 25)
         for i, v in enumerate(pattern, start=1):
-            assert run[f"master[{i}].r"][2] == pytest.approx(v * np.sin(omega * 0.05 * k) / omega, abs=2e-4 / omega)
+            assert run[f"master[{i}].r"][2] == pytest.approx(v * np.sin(omega * 0.05 * k) / omega, abs=1e-6 / omega)
 
 
 @pytest.mark.parametrize("inertia, limit", [("consistent", np.sqrt(K / M)), ("lumped", np.sqrt(K / (M + MS / 4)))])
@@ -72,12 +72,19 @@ def test_highest_frequency(inertia, limit):
 def test_lumped_inertia_never_holds_less_energy():
     """THEORY 4: lambda bounds the slave's kinetic energy for every motion; 1000 random segments."""
     rng = np.random.default_rng(0)
+    closest = np.inf
     for k in range(1000):
-        scene = one_segment(rng, 3 + k % 2, "optimized", False, motion="free", slaves=1)
-        velocities = [{"nodes": [i], "v": rng.normal(size=3).tolist()} for i in range(1, 4 + k % 2)]
-        energies = [Run(scene | {"initial": velocities, "model": {"inertia": inertia}})["energy.kinetic"]
-                    for inertia in ("lumped", "consistent")]
-        assert energies[0] >= energies[1] * (1 - 1e-12)
+        n = 3 + k % 2
+        scene = one_segment(rng, n, "optimized", False, motion="free", slaves=1)
+        velocity = rng.normal(size=(n, 3))
+        scene["initial"] = [{"nodes": [i + 1], "v": v.tolist()} for i, v in enumerate(velocity)]
+        run = Run(scene)
+        own = sum(0.5 * table["mass"] * v @ v for table, v in zip(scene["node"][1:], velocity))
+        added = sum(0.5 * run[f"master[{i + 1}].added_mass"] * v @ v for i, v in enumerate(velocity))
+        slave = run["energy.kinetic"] - own  # the true energy counts the slave's own
+        assert 0 < slave <= added * (1 + 1e-12)
+        closest = min(closest, added / slave)
+    assert closest < 2  # and it is not far above
 
 
 def host(reaction, inertia, ratio, step, cycles):

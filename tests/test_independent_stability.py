@@ -14,7 +14,7 @@ forms = pytest.mark.parametrize("formulation, rotations", FORMS)
 
 @forms
 @pytest.mark.parametrize("inertia", ["lumped", "consistent"])
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(40))
 def test_stable_step_is_two_over_omega_max(seed, inertia, formulation, rotations):
     scene = structure(np.random.default_rng(seed), formulation, rotations, inertia)
     exact = 2 / Problem(scene).omega_max()
@@ -93,11 +93,14 @@ def test_nodal_rule_bounds_the_optimized_formulation(seed):
 @forms
 @pytest.mark.parametrize("method", ["central-difference", "symplectic-euler", "noh-bathe", "rk4"])
 def test_motion_stays_bounded_near_the_limit(method, formulation, rotations):
-    scene = structure(np.random.default_rng(2), formulation, rotations, "consistent")
-    run = Run(scene | {"integrator": {"method": method, "safety": 0.95}})
-    energy = run["energy.kinetic"] + run["energy.strain"]
-    run.step(0.95 * run.simulation.integrator_limit * 50, 100)
-    assert run["energy.kinetic"] + run["energy.strain"] < 3 * energy
+    """0.95 of the limit on small motions; on large ones the frequencies change on the way, and 0.9 is enough."""
+    for safety, speed in ((0.95, 0.05), (0.9, 1.0)):
+        scene = structure(np.random.default_rng(2), formulation, rotations, "consistent", speed=speed)
+        run = Run(scene | {"integrator": {"method": method, "safety": safety}})
+        energy = run["energy.kinetic"] + run["energy.strain"]
+        for _ in range(100):
+            run.step(safety * run.simulation.integrator_limit * 50)
+            assert run["energy.kinetic"] + run["energy.strain"] < 3 * energy
 
 
 def test_a_rivet_between_slaves_outside_their_segments():
