@@ -9,14 +9,15 @@ import numpy as np
 HERE = Path(__file__).parent
 RADIUS = 150.0  # mm, of the flange about the y axis
 GAP = 2.0  # mm between the two mid-surfaces
+HOLE = 24.0  # mm, arc length from the middle to the hole
 TWIST = 0.002  # 1/mm: the plate is warped by TWIST x y
 
 
 def flange():
-    """Flat mesh of a 80 x 40 mm flange with a hole of 12 mm, quads and triangles: tags, points, quads, triangles."""
+    """Flat mesh of a 84 x 40 mm flange with a hole of 12 mm, in quads and triangles."""
     occ = gmsh.model.occ
-    sheet = occ.addRectangle(-40, -20, 0, 80, 40)
-    hole = occ.addDisk(22, 0, 0, 6, 6)
+    sheet = occ.addRectangle(-42, -20, 0, 84, 40)
+    hole = occ.addDisk(HOLE, 0, 0, 6, 6)
     occ.cut([(2, sheet)], [(2, hole)])
     occ.synchronize()
     surface = gmsh.model.getEntities(2)[0][1]
@@ -38,9 +39,9 @@ def roll():
 
 
 def plate():
-    """A coarse plate of 20 mm quads on the cylinder, warped by a twist; three of its quads are cut into triangles."""
+    """A coarse plate of 15 mm quads on the cylinder, warped by a twist; three of its quads are cut into triangles."""
     first = int(gmsh.model.mesh.getMaxNodeTag()) + 1
-    columns, rows, size = 6, 4, 20.0
+    columns, rows, size = 6, 3, 15.0
     tags, points = [], []
     for j in range(rows + 1):
         for i in range(columns + 1):
@@ -82,7 +83,7 @@ def main():
     flange()
     group = gmsh.model.getPhysicalGroups(2)[0][1]
     tags, points = gmsh.model.mesh.getNodesForPhysicalGroup(2, group)
-    distance = np.hypot(points[0::3] - 22, points[1::3])
+    distance = np.hypot(points[0::3] - HOLE, points[1::3])
     slaves = np.sort(tags)
     rim = 1 + np.searchsorted(slaves, np.sort(tags[distance < 6.01]))
     roll()
