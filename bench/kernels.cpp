@@ -2,6 +2,7 @@
 // (ns per slave and cycle, per call, or per value; bytes per slave that must move, or 0).
 //
 //   tiefmu_bench kernels N         cycles at N slaves: loads to masters, accelerations, velocities, slave motion
+//   tiefmu_bench cycles COUPLING N COUNT   that many cycles and no timing, for instruction counts
 //   tiefmu_bench memory COUPLING N bytes per slave of a whole simulation, model included
 //   tiefmu_bench fmu FOLDER        fmi2DoStep, set and get of an unpacked FMU (FOLDER holds binaries/, resources/)
 #include <dlfcn.h>
@@ -35,7 +36,7 @@ double now() {
 
 // Best of several runs of `body`, each long enough to be measured, in seconds per call.
 template <class Body>
-double best(Body body, double enough = 0.05) {
+double best(Body&& body, double enough = 0.05) {
   body();
   long calls = 1;
   double shortest = 1e30;
@@ -128,18 +129,27 @@ double bytesMoved(const std::string& coupling) {
   return slave + master / 4;
 }
 
-void kernels(int slaves, bool shuffled) {
-  const double gbs = triad();
-  for (const std::string coupling : {"default", "default-rotations", "optimized"}) {
-    Simulation simulation(std::make_shared<Model>(compile(surface(coupling, slaves, shuffled))));
+// One simulation under its own loads, ready to cycle.
+struct Cycle {
+  Simulation simulation;
+  Cycle(const std::string& coupling, int slaves, bool shuffled)
+      : simulation(std::make_shared<Model>(compile(surface(coupling, slaves, shuffled)))) {
     const std::size_t forces = simulation.layout()[Field::slaveForce].count;
     for (std::size_t k = 0; k < forces; ++k) simulation.field(Field::slaveForce)[k] = 1e-3 * static_cast<double>(k % 7);
     simulation.initialise(0);
-    const double seconds = best([&] {
-      simulation.step(1e-6);
-      simulation.updateOutputs();
-    });
-    const int n = simulation.model().slaves();
+  }
+  void operator()() {
+    simulation.step(1e-6);
+    simulation.updateOutputs();
+  }
+};
+
+void kernels(int slaves, bool shuffled) {
+  const double gbs = triad();
+  for (const std::string coupling : {"default", "default-rotations", "optimized"}) {
+    Cycle cycle(coupling, slaves, shuffled);
+    const double seconds = best(cycle);
+    const int n = cycle.simulation.model().slaves();
     std::printf("%s%s,%d,1,%.2f,%.0f,%.2f\n", coupling.c_str(), shuffled ? "-shuffled" : "", n, 1e9 * seconds / n,
                 bytesMoved(coupling), gbs);
     std::fflush(stdout);
@@ -239,10 +249,13 @@ void fmu(const std::string& folder) {
 int main(int argc, char** argv) {
   const std::string what = argc > 1 ? argv[1] : "";
   if (what == "kernels" && argc > 2) kernels(std::atoi(argv[2]), argc > 3 && !std::strcmp(argv[3], "shuffled"));
-  else if (what == "memory" && argc > 3) memory(argv[2], std::atoi(argv[3]));
+  else if (what == "cycles" && argc > 4) {
+    Cycle cycle(argv[2], std::atoi(argv[3]), false);
+    for (int k = std::atoi(argv[4]); k > 0; --k) cycle();
+  } else if (what == "memory" && argc > 3) memory(argv[2], std::atoi(argv[3]));
   else if (what == "fmu" && argc > 2) fmu(argv[2]);
   else {
-    std::fprintf(stderr, "usage: tiefmu_bench kernels N [shuffled] | memory COUPLING N | fmu FOLDER\n");
+    std::fprintf(stderr, "usage: tiefmu_bench kernels N [shuffled] | cycles COUPLING N COUNT | memory COUPLING N | fmu FOLDER\n");
     return 2;
   }
 }

@@ -1,37 +1,42 @@
 #include "tie.hpp"
 
-// One source for every instruction set: four doubles are two SSE registers, one AVX register, as the clone is compiled
-// for. No clone may contract multiplications and additions (-ffp-contract=off), so all give the same bits.
-#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && defined(__linux__) && \
-    !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
-#define TIEFMU_CLONES __attribute__((target_clones("arch=x86-64-v4", "arch=x86-64-v3", "default")))
-#else
-#define TIEFMU_CLONES
-#endif
 #define TIEFMU_INLINE inline __attribute__((always_inline))
-#define TIEFMU_INLINED __attribute__((always_inline))  // for lambdas: part of the clone that calls them
+#define TIEFMU_INLINED __attribute__((always_inline))  // for lambdas
 
 namespace tiefmu {
 namespace {
 
-// x, y, z and a spare zero.
-using Pack = double __attribute__((vector_size(32)));
-using Lanes = long long __attribute__((vector_size(32)));
+// x, y in one register and z in another, which baseline x86-64 (and every other 16-byte vector unit) serves. Builds of
+// these kernels for AVX2 and AVX-512 were measured at 0.95 to 1.25 times the speed: not worth a second code path.
+using Pair = double __attribute__((vector_size(16)));
+struct Pack {
+  Pair xy;
+  double z;
+  double operator[](int k) const { return k < 2 ? xy[k] : z; }
+};
 
-TIEFMU_INLINE Pack load(const double* p) { return Pack{p[0], p[1], p[2], 0}; }
+TIEFMU_INLINE Pack load(const double* p) { return {Pair{p[0], p[1]}, p[2]}; }
 TIEFMU_INLINE void store(double* p, Pack a) {
-  p[0] = a[0];
-  p[1] = a[1];
-  p[2] = a[2];
+  p[0] = a.xy[0];
+  p[1] = a.xy[1];
+  p[2] = a.z;
 }
-TIEFMU_INLINE Pack yzx(Pack a) { return __builtin_shuffle(a, Lanes{1, 2, 0, 3}); }
-TIEFMU_INLINE Pack cross(Pack a, Pack b) { return yzx(a * yzx(b) - yzx(a) * b); }
+TIEFMU_INLINE Pack operator+(Pack a, Pack b) { return {a.xy + b.xy, a.z + b.z}; }
+TIEFMU_INLINE Pack operator-(Pack a, Pack b) { return {a.xy - b.xy, a.z - b.z}; }
+TIEFMU_INLINE Pack operator-(Pack a) { return {-a.xy, -a.z}; }
+TIEFMU_INLINE Pack operator*(double s, Pack a) { return {s * a.xy, s * a.z}; }
+TIEFMU_INLINE Pack operator*(Pack a, double s) { return {a.xy * s, a.z * s}; }
+TIEFMU_INLINE Pack& operator+=(Pack& a, Pack b) { return a = a + b; }
+TIEFMU_INLINE Pack cross(Pack a, Pack b) {
+  const Pair ayz = {a.xy[1], a.z}, byz = {b.xy[1], b.z}, azx = {a.z, a.xy[0]}, bzx = {b.z, b.xy[0]};
+  return {ayz * bzx - azx * byz, a.xy[0] * b.xy[1] - a.xy[1] * b.xy[0]};
+}
 TIEFMU_INLINE double dot(Pack a, Pack b) {
-  const Pack p = a * b;
-  return p[0] + p[1] + p[2];
+  const Pair p = a.xy * b.xy;
+  return p[0] + p[1] + a.z * b.z;
 }
 TIEFMU_INLINE Pack symmetric(const double* m, Pack a) {
-  return Pack{m[0], m[1], m[2], 0} * a[0] + Pack{m[1], m[3], m[4], 0} * a[1] + Pack{m[2], m[4], m[5], 0} * a[2];
+  return Pack{{m[0], m[1]}, m[2]} * a.xy[0] + Pack{{m[1], m[3]}, m[4]} * a.xy[1] + Pack{{m[2], m[4]}, m[5]} * a.z;
 }
 
 template <int N>
@@ -278,7 +283,7 @@ TIEFMU_INLINE void turnOffsetsN(const TieGroup& group, SegmentRange range, doubl
   eachSegment<N>(group, range, [&](int, Corners<N> corners, std::ptrdiff_t s, std::ptrdiff_t last) TIEFMU_INLINED {
     Pack wi[N];
     corners.gather(spin, wi);
-    for (int i = 0; i < N; ++i) wi[i] *= h;
+    for (int i = 0; i < N; ++i) wi[i] = h * wi[i];
     for (; s < last; ++s) {
       const Pack d = rotated(weighted<N>(weight + N * s, wi), load(offset + 3 * s));
       // One Newton step of 1/sqrt: exact, as the length is off by rounding only.
@@ -319,7 +324,7 @@ TIEFMU_INLINE void moveSegmentsN(const TieGroup& group, SegmentRange range, doub
 
 // The public kernels choose the coupling and the number of corners, once per call.
 
-TIEFMU_CLONES void follow(const TieGroup& group, SegmentRange range, TieGeometry geometry, const double* u,
+void follow(const TieGroup& group, SegmentRange range, TieGeometry geometry, const double* u,
                           const double* turn, double* us, double* turns) {
   const bool quads = group.corners == 4;
   switch (group.coupling) {
@@ -334,7 +339,7 @@ TIEFMU_CLONES void follow(const TieGroup& group, SegmentRange range, TieGeometry
   }
 }
 
-TIEFMU_CLONES void distribute(const TieGroup& group, SegmentRange range, TieGeometry geometry, const double* force,
+void distribute(const TieGroup& group, SegmentRange range, TieGeometry geometry, const double* force,
                               const double* moment, double* f, double* t) {
   const bool quads = group.corners == 4;
   switch (group.coupling) {
@@ -350,7 +355,7 @@ TIEFMU_CLONES void distribute(const TieGroup& group, SegmentRange range, TieGeom
   }
 }
 
-TIEFMU_CLONES void addBias(const TieGroup& group, SegmentRange range, TieGeometry geometry, const double* velocity,
+void addBias(const TieGroup& group, SegmentRange range, TieGeometry geometry, const double* velocity,
                            const double* spin, double* as, double* zs) {
   const bool quads = group.corners == 4;
   switch (group.coupling) {
@@ -365,7 +370,7 @@ TIEFMU_CLONES void addBias(const TieGroup& group, SegmentRange range, TieGeometr
   }
 }
 
-TIEFMU_CLONES void place(const TieGroup& group, SegmentRange range, TieGeometry geometry, const double* position,
+void place(const TieGroup& group, SegmentRange range, TieGeometry geometry, const double* position,
                          double* xs) {
   const bool quads = group.corners == 4;
   if (group.coupling == Coupling::meanMotion)
@@ -375,7 +380,7 @@ TIEFMU_CLONES void place(const TieGroup& group, SegmentRange range, TieGeometry 
                : placeWeighted<3>(group, range, geometry.offset, position, xs);
 }
 
-TIEFMU_CLONES void updateFrames(const TieGroup& group, SegmentRange range, const double* position,
+void updateFrames(const TieGroup& group, SegmentRange range, const double* position,
                                 SegmentFrame* frame) {
   const auto update = [&](auto n) TIEFMU_INLINED {
     constexpr int N = decltype(n)::value;
@@ -389,26 +394,26 @@ TIEFMU_CLONES void updateFrames(const TieGroup& group, SegmentRange range, const
   else update(std::integral_constant<int, 3>{});
 }
 
-TIEFMU_CLONES void turnOffsets(const TieGroup& group, SegmentRange range, double h, const double* spin,
+void turnOffsets(const TieGroup& group, SegmentRange range, double h, const double* spin,
                                const double* inverseLength2, double* offset) {
   return group.corners == 4 ? turnOffsetsN<4>(group, range, h, spin, inverseLength2, offset)
                             : turnOffsetsN<3>(group, range, h, spin, inverseLength2, offset);
 }
 
-TIEFMU_CLONES void moveSegments(const TieGroup& group, SegmentRange range, double h, const double* position,
+void moveSegments(const TieGroup& group, SegmentRange range, double h, const double* position,
                                 const double* velocity, SegmentFrame* frame, double* rotation) {
   return group.corners == 4 ? moveSegmentsN<4>(group, range, h, position, velocity, frame, rotation)
                             : moveSegmentsN<3>(group, range, h, position, velocity, frame, rotation);
 }
 
-TIEFMU_CLONES void rotateOffsets(const TieGroup& group, SegmentRange range, const double* rotation,
+void rotateOffsets(const TieGroup& group, SegmentRange range, const double* rotation,
                                  const double* initialOffset, double* offset) {
   for (int e = range.first; e < range.last; ++e) {
     const double* q = rotation + 4 * static_cast<std::ptrdiff_t>(e);
     const double w = q[0], x = q[1], y = q[2], z = q[3];
-    const Pack c0 = {1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y), 0};
-    const Pack c1 = {2 * (x * y - w * z), 1 - 2 * (x * x + z * z), 2 * (y * z + w * x), 0};
-    const Pack c2 = {2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y), 0};
+    const Pack c0 = {{1 - 2 * (y * y + z * z), 2 * (x * y + w * z)}, 2 * (x * z - w * y)};
+    const Pack c1 = {{2 * (x * y - w * z), 1 - 2 * (x * x + z * z)}, 2 * (y * z + w * x)};
+    const Pack c2 = {{2 * (x * z + w * y), 2 * (y * z - w * x)}, 1 - 2 * (x * x + y * y)};
     for (std::ptrdiff_t s = group.firstSlave + group.begin[e]; s < group.firstSlave + group.begin[e + 1]; ++s) {
       const double* d0 = initialOffset + 3 * s;
       store(offset + 3 * s, c0 * d0[0] + c1 * d0[1] + c2 * d0[2]);
@@ -416,7 +421,7 @@ TIEFMU_CLONES void rotateOffsets(const TieGroup& group, SegmentRange range, cons
   }
 }
 
-TIEFMU_CLONES void meanSpin(const TieGroup& group, SegmentRange range, const SegmentFrame* frame,
+void meanSpin(const TieGroup& group, SegmentRange range, const SegmentFrame* frame,
                             const double* velocity, double* spin) {
   const auto compute = [&](auto n) TIEFMU_INLINED {
     constexpr int N = decltype(n)::value;
