@@ -69,7 +69,7 @@ def local_coordinates(corners, s):
             uphill = (half(at + length[:, None] * move) > half(at)) & (np.linalg.norm(move, axis=1) > 1e-7)
             length[uphill] /= 2
         u[going] = at + length[:, None] * move
-        going = going[np.linalg.norm(move, axis=1) > 1e-15]
+        going = going[np.linalg.norm(move, axis=1) > 1e-13 * (1 + np.linalg.norm(at, axis=1))]
         if not len(going):
             break
     return u
@@ -181,12 +181,13 @@ def find(position, segments, ids, points, method, reach, tie=1e-9):
         distance[:, e] = np.linalg.norm(phi.T @ corners - points, axis=1)
         nearest[:, e] = np.linalg.norm(corners - points[:, None], axis=2).min(axis=1)
         outside[:, e] = np.max(1 - 2 * phi, axis=0) if len(corners) == 3 else np.abs(local[:, e]).max(axis=1)
-    answer, slack = [], tie * reach
+    answer, slack, nodes = [], tie * reach, {n for e in usable for n in segments[e]}
     for k, s in enumerate(points):
         if method == "nearest-node":
-            held = {n for e in usable for n in segments[e] if np.all(np.abs(position[n] - s) <= reach / 2)}
-            gap = {n: np.linalg.norm(position[n] - s) for n in held}
-            held = {n for n in held if gap[n] <= min(gap.values()) + slack}
+            gap = np.linalg.norm(position - s, axis=1)
+            gap[np.any(np.abs(position - s) > reach / 2, axis=1)] = np.inf
+            gap[[n not in nodes for n in range(len(position))]] = np.inf
+            held = set(np.flatnonzero(gap <= gap.min() + slack)) if gap.min() < np.inf else set()
             rated = [e for e in usable if held & set(segments[e])]
         else:
             rank = np.where(outside[k] <= 1 + tie, distance[k], nearest[k])

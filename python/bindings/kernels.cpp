@@ -1,6 +1,7 @@
 // The solver's kernels for tests and studies: NumPy arrays in, NumPy arrays out.
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
+#include <nanobind/stl/pair.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
