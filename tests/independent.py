@@ -458,7 +458,9 @@ class Problem:
         d, place = self.offsets(x, qs, xs)
         tmap, bias = self.maps(x, v, w, d)
         twist = (tmap @ np.hstack([v, w]).ravel()).reshape(-1, 6)
-        outside = float(np.sum(node_load * np.hstack([v, w])) + np.sum(slave_load * twist))
+        outside = np.sum(node_load * np.hstack([v, w])) + np.sum(slave_load * twist)
+        outside += self.mass * (self.motion == "free") @ (v @ self.gravity)
+        outside += sum(s.mass * self.gravity @ u[:3] for s, u in zip(self.slaves, twist))
         strain = dissipation = 0.0
         one = np.array([1.0, 0, 0, 0])
         state = {"node": (x, v, qn, w, node_load), "slave": (place, twist[:, :3], qs, twist[:, 3:], slave_load)}

@@ -120,3 +120,36 @@ def test_full_reaction_diverges_above_mass_ratio_one(step):
 @pytest.mark.parametrize("ratio", [0.5, 10.0])
 def test_loads_and_split_stay_stable(reaction, inertia, ratio):
     assert host(reaction, inertia, ratio, 1e-3, 3000) < 3
+
+
+def growth(stiffness, damping, step, cycles):
+    """A host of mass 1 that moves all masters and holds the force it got from the tie over each step."""
+    scene = quad(UNIT, [0.5, 0.5, 0.0])
+    scene["spring"] = [{"ground": [5], "kind": "bushing", "stiffness": stiffness, "damping": damping}]
+    run = Run(scene | {"model": {"position": "input"}})
+    x, v, sizes = 1e-3, 0.0, []
+    start = np.array([row[1:] for row in UNIT], float)
+    for _ in range(cycles):
+        for i in range(4):
+            run.set({f"master[{i + 1}].r": start[i] + [0, 0, x], f"master[{i + 1}].v": [0, 0, v]})
+        f = sum(run[f"master[{i}].f"][2] for i in range(1, 5))
+        assert f == pytest.approx(-stiffness * x - damping * v, rel=1e-9, abs=1e-12 * stiffness)
+        x, v = x + step * v + step**2 / 2 * f, v + step * f
+        sizes.append(np.hypot(x * np.sqrt(stiffness), v))
+    return np.array(sizes)
+
+
+def test_held_force_without_damping_grows_at_every_step():
+    """By sqrt(1 + k H^2 / 2m) a step, so by k H^2 / 2m in the determinant of a step."""
+    stiffness, step = 100.0, 0.01
+    sizes = growth(stiffness, 0.0, step, 2000)
+    assert (sizes[-1] / sizes[0]) ** (1 / 1999) == pytest.approx(np.sqrt(1 + stiffness * step**2 / 2), rel=1e-4)
+
+
+@pytest.mark.parametrize("zeta", [0.1, 0.3, 0.5, 0.8, 2.0])
+def test_held_force_with_damping(zeta):
+    """Stable if and only if H omega < min(4 zeta, 1 / zeta)."""
+    omega, limit = 10.0, min(4 * zeta, 1 / zeta)
+    for factor, stable in ((0.97, True), (1.03, False)):
+        sizes = growth(omega**2, 2 * zeta * omega, factor * limit / omega, 1500)
+        assert (sizes[-1] < sizes[0]) == stable

@@ -4,6 +4,7 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
+from scipy.integrate import simpson
 
 from in_process import Run
 from independent import Problem
@@ -113,6 +114,23 @@ def test_motion(kind, inertia, formulation, rotations):
 
 
 @forms
+def test_energy_balance(formulation, rotations):
+    """Work of loads and gravity, what the dampers took and what is left over, against integrals of the independent
+    powers. Left over is only the work of bushings that are stiffer one way than another: theirs is no potential."""
+    scene, inputs, problem, _ = case("loaded", formulation, rotations, "consistent")
+    times = np.linspace(0, END, 201)
+    solution = problem.solve(times, constant(inputs))
+    program, _ = run(scene, inputs, "rk4", 800)
+    balance = np.diff([solution[k]["kinetic"] + solution[k]["strain"] for k in (0, -1)])[0]
+    for name, power, sign in (("external", "external", -1), ("dissipated", "dissipation", 1)):
+        expected = simpson([now[power] for now in solution], x=times)
+        balance += sign * expected
+        assert abs(expected) > 0.1
+        assert program[f"energy.{name}"] == pytest.approx(expected, abs=1e-5)
+    assert program["energy.residual"] == pytest.approx(balance, abs=1e-5)
+
+
+@forms
 @pytest.mark.parametrize("inertia", ["lumped", "consistent"])
 def test_small_geometry(inertia, formulation, rotations):
     scene, inputs, problem, solution = case("swinging", formulation, rotations, inertia, "small")
@@ -140,3 +158,30 @@ def test_energy_of_consistent_inertia_is_constant_to_the_order(method, order, fo
     changes = [run(scene, inputs, method, steps)[1] for steps in (100, 200, 400, 800)]
     orders = np.log2(np.array(changes[:-1]) / changes[1:])
     assert np.all(orders > order - 0.3), changes
+
+
+@pytest.mark.parametrize("formulation", ["default", "optimized"])
+def test_true_energy_drifts_with_lumped_inertia_only(formulation):
+    """THEORY 4: with m_s/m_i = 0.7 and an offset of 0.4 edges by per cents, whatever the step."""
+    rotations = formulation == "default"
+    scene = {
+        "mesh": {"nodes": [[1, 0, 0, 0], [2, 1, 0, 0], [3, 1, 1, 0], [4, 0, 1, 0], [5, 0.7, 0.4, 0.4]],
+                 "segments": [[1, 1, 2, 3, 4]]},
+        "node": [{"nodes": "all", "motion": "free", "rotations": rotations, "mass": 1.0,
+                  "inertia": 0.1 if rotations else 0.0}, {"nodes": [5], "mass": 0.7, "inertia": 0.0}],
+        "tie": [{"name": "tie", "segments": "all", "slaves": [5], "formulation": formulation}],
+        "spring": [{"ground": [1, 2, 3, 4], "kind": "bushing", "stiffness": 100.0}
+                   | ({"rotational_stiffness": 10.0} if rotations else {})],
+        "initial": [{"nodes": [1], "v": [0.1, 0, 0.3]}, {"nodes": [3], "v": [0, 0.2, -0.2]}],
+        "integrator": {"method": "rk4"},
+    }
+    drift = {}
+    for inertia in ("lumped", "consistent"):
+        program = Run(scene | {"model": {"inertia": inertia}})
+        energy = lambda: program["energy.kinetic"] + program["energy.strain"]
+        start, drift[inertia] = energy(), 0.0
+        for _ in range(500):
+            program.step(0.002)
+            drift[inertia] = max(drift[inertia], abs(energy() / start - 1))
+    assert 0.01 < drift["lumped"] < 0.5
+    assert drift["consistent"] < 1e-8
