@@ -132,6 +132,11 @@ def test_initial_velocities_pass_slaves_and_fixed_nodes_of_all(weld):
     assert simulation.get_values(names).tolist() == [0, 0, 1, 0, 0, 1, 0, 3, 0, 2]
 
 
+def test_a_tie_without_a_name_is_called_by_its_number(weld):
+    del weld["tie"][0]["name"]
+    assert found(weld)["slaves"][0]["tie"] == "1"
+
+
 def test_nodes_that_nothing_uses_are_left_out_and_named(weld):
     weld["mesh"]["nodes"] += [[7, 1, 0, 0], [6, 1, 1, 0]]
     assert found(weld)["left_out"] == [6, 7]

@@ -75,7 +75,7 @@ std::vector<T> list(const Array& array) {
   return std::vector<T>(array.data(), array.data() + array.shape(0));
 }
 
-// ---------------------------------------------------------------------------------------------------------------- Scene
+// ---- Scene
 
 void setNodes(Scene& scene, const Ids& id, const Vectors& position, const Bytes& motion, const Bytes& rotations,
               const Doubles& mass, const Doubles& inertia, const Doubles& stiffness,
@@ -169,7 +169,7 @@ void setSettings(Scene& scene, const std::string& inertia, const std::string& re
   s.hide = hide;
 }
 
-// ---------------------------------------------------------------------------------------------------------------- Model
+// ---- Model
 
 std::shared_ptr<Model> compileScene(const Scene& scene) {
   checkInterface(scene.settings);
@@ -278,7 +278,7 @@ nb::dict report(const Model& model) {
   return d;
 }
 
-// ----------------------------------------------------------------------------------------------------------- Simulation
+// ---- Simulation
 
 struct FieldName {
   Field field;

@@ -3,6 +3,7 @@
 import argparse
 import json
 import math
+import os
 import sys
 import tempfile
 from pathlib import Path
@@ -16,9 +17,14 @@ def main(arguments: list[str] | None = None) -> int:
     """Runs a command; returns the exit status: 0, 1 (a check of the demo failed), 2 (bad input), 130 (Ctrl-C)."""
     options = parser().parse_args(arguments)
     try:
-        return options.command(options) or 0
+        status = options.command(options) or 0
+        sys.stdout.flush()
+        return status
     except (SceneError, RunError) as error:
         return fail(str(error))
+    except BrokenPipeError:  # somebody reads no further, as in `tiefmu info weld.toml | head`
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
     except OSError as error:
         return fail(f"{error.filename}: {error.strerror}" if error.filename else str(error))
     except KeyboardInterrupt:

@@ -21,13 +21,13 @@ class RunError(Exception):
 
 def run(fmu: Path, stop_time: float | None = None, step: float | None = None, inputs: Path | None = None,
         name: str | None = None) -> np.ndarray:
-    """Runs the FMU and returns its outputs: a structured array with `time` (s) and one column an output,
-    and FMPy's description of the FMU as `.modelDescription`.
+    """Runs the FMU and returns its outputs: a structured array with `time` (s) and one column an output, and FMPy's
+    description of the FMU as `.modelDescription`.
 
     stop_time, s: by default the end of the input CSV, else the FMU's default experiment. step: communication step, s,
-    by default the FMU's, but so small that the run has at least STEPS. inputs: CSV with `time` and names of inputs, linear in between; a time given twice is a jump.
-    Row k holds what the FMU answers at the end of step k, the inputs being those of the start of the step.
-    name: how messages call the FMU. Raises RunError.
+    by default the FMU's, but so small that the run has at least STEPS. inputs: CSV with `time` and names of inputs,
+    linear in between; a time given twice is a jump. name: how messages call the FMU. Row k holds what the FMU answers
+    at the end of step k, the inputs being those of the start of the step. Raises RunError.
     """
     import fmpy  # here, because importing it takes half a second
     import fmpy.fmi2
