@@ -315,7 +315,8 @@ TIEFMU_INLINE void moveSegmentsN(const TieGroup& group, SegmentRange range, doub
       q[2] = scale * j;
       q[3] = scale * k;
     }
-    for (int i = 0; i < N; ++i) xi[i] += (0.5 * h) * vi[i];
+    corners.gather(x, xi);  // the end as the positions are advanced, so that a restored state finds the same bits
+    for (int i = 0; i < N; ++i) xi[i] += h * vi[i];
     frameOf<N>(xi, frame[e]);
   });
 }
