@@ -69,6 +69,13 @@ std::string text(double number) {
   return buffer;
 }
 
+// Bytes from outside as they may stand in a message.
+std::string printable(std::string bytes) {
+  for (char& c : bytes)
+    if (c < ' ' || c > '~') c = '?';
+  return bytes;
+}
+
 // Communication points are sums of steps that the master may round in another order than we do; but a missed or
 // repeated step is always seen.
 double tolerance(double time, double step) { return 1e-12 * std::abs(time) + 1e-3 * step; }
@@ -91,7 +98,8 @@ Resource loadResource(const std::string& location, const std::string& guid) {
     throw ResourceError("'" + path + "': " + e.what());
   }
   if (resource.guid != guid)
-    throw ResourceError("'" + path + "' has GUID '" + resource.guid + "', the caller expects '" + guid + "'");
+    throw ResourceError("'" + path + "' has GUID '" + printable(resource.guid) + "', the caller expects '" +
+                        printable(guid) + "'");
   return resource;
 }
 

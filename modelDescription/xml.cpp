@@ -256,10 +256,7 @@ class Structure {
       row.clear();
       for (std::size_t i = rows.begin[r]; i < rows.begin[r + 1]; ++i) {
         const Dependency& d = rows.entries[i];
-        if (!isParameter[d.reference])
-          row.push_back({index[d.reference], initial && d.kind == Dependence::fixed ? Dependence::dependent : d.kind});
-        else if (initial)
-          row.push_back({index[d.reference], d.kind});
+        if (initial || !isParameter[d.reference]) row.push_back({index[d.reference], d.kind});
       }
       std::sort(row.begin(), row.end(),
                 [](const Dependency& a, const Dependency& b) { return a.reference < b.reference; });
@@ -269,10 +266,12 @@ class Structure {
         out += ' ';
       }
       closeList();
-      out += " dependenciesKind=\"";
-      for (const Dependency& d : row)
-        out += d.kind == Dependence::constant ? "constant " : d.kind == Dependence::fixed ? "fixed " : "dependent ";
-      closeList();
+      if (!initial) {  // in initialisation the standard knows no `fixed`, and the lists are half of a large file
+        out += " dependenciesKind=\"";
+        for (const Dependency& d : row)
+          out += d.kind == Dependence::constant ? "constant " : d.kind == Dependence::fixed ? "fixed " : "dependent ";
+        closeList();
+      }
     }
     out += "/>\n";
   }

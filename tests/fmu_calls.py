@@ -2,6 +2,7 @@
 
 import ctypes
 import sys
+import tempfile
 import zipfile
 from ctypes import POINTER, byref, c_char_p, c_double, c_int, c_size_t, c_uint, c_void_p
 from pathlib import Path
@@ -22,11 +23,11 @@ class Callbacks(ctypes.Structure):
 
 
 class Fmu:
-    """A scene built, unpacked into `folder`, with its description read and validated."""
+    """A scene built and unpacked into a new folder in `folder`, with its description read and validated."""
 
     def __init__(self, scene: dict, folder: Path):
-        self.path = tiefmu.build(tiefmu.load(scene), folder / "scene.fmu")
-        self.folder = folder / "unpacked"
+        self.folder = Path(tempfile.mkdtemp(dir=folder))  # a library that is loaded must not be overwritten
+        self.path = tiefmu.build(tiefmu.load(scene), self.folder / "scene.fmu")
         with zipfile.ZipFile(self.path) as archive:
             archive.extractall(self.folder)
         self.description = fmpy.read_model_description(str(self.path), validate=True, validate_variable_names=True,

@@ -1,0 +1,661 @@
+"""The FMU's C functions: states, refusals, messages, saved states, and what a caller may rely on."""
+
+import ctypes
+import os
+import struct
+from ctypes import byref, c_char_p, c_double, c_int, c_size_t, c_uint, c_void_p
+
+import fmpy
+import numpy as np
+import pytest
+
+from fmu_calls import DISCARD, ERROR, OK, Fmu, Instance
+from test_fmu_dependencies import random_values
+from test_fmu_dependencies import scene as many_sided
+
+MIXED = ("default", True, "mixed", "consistent", "split", "finite", "integrated")
+ALL_FREE = ("optimized", True, "free", "lumped", "loads", "finite", "integrated")
+
+
+@pytest.fixture(scope="module")
+def fmu(tmp_path_factory):
+    """Driven, free and fixed masters, springs, dampers, everything exposed."""
+    return Fmu(many_sided(np.random.default_rng(1), *MIXED), tmp_path_factory.mktemp("fmu"))
+
+
+@pytest.fixture(scope="module", params=[MIXED, ALL_FREE, ("default", False, "driven", "lumped", "full", "small", "input")],
+                ids=["mixed", "free", "driven"])
+def any_fmu(request, tmp_path_factory):
+    return Fmu(many_sided(np.random.default_rng(2), *request.param), tmp_path_factory.mktemp("fmu"))
+
+
+@pytest.fixture
+def loose(tmp_path):
+    """One free quad without springs: nothing limits the step, and a large force runs away."""
+    scene = {"mesh": {"nodes": [[1, 0, 0, 0], [2, 1, 0, 0], [3, 1, 1, 0], [4, 0, 1, 0], [101, 0.3, 0.6, 0.0]],
+                      "segments": [[1, 1, 2, 3, 4]]},
+             "node": [{"nodes": "all", "motion": "free", "mass": 1.0}],
+             "tie": [{"name": "tie", "slaves": [101]}], "interface": {"expose": ["slave.mass"]}}
+    return Fmu(scene, tmp_path)
+
+
+def diverged(loose) -> Instance:
+    instance = Instance(loose).start(values={"slave[1].f[1]": 1e30})
+    assert instance.step(0, 1.0) == ERROR
+    return instance
+
+
+# ------------------------------------------------------------------------------------------- the library and its states
+
+COMMON = ["GetTypesPlatform", "GetVersion", "SetDebugLogging", "Instantiate", "FreeInstance", "SetupExperiment",
+          "EnterInitializationMode", "ExitInitializationMode", "Terminate", "Reset", "GetReal", "GetInteger",
+          "GetBoolean", "GetString", "SetReal", "SetInteger", "SetBoolean", "SetString", "GetFMUstate", "SetFMUstate",
+          "FreeFMUstate", "SerializedFMUstateSize", "SerializeFMUstate", "DeSerializeFMUstate",
+          "GetDirectionalDerivative"]
+CO_SIMULATION = ["SetRealInputDerivatives", "GetRealOutputDerivatives", "DoStep", "CancelStep", "GetStatus",
+                 "GetRealStatus", "GetIntegerStatus", "GetBooleanStatus", "GetStringStatus"]
+
+
+def elf_exports(data: bytes) -> set[str]:
+    """Defined symbols of an ELF64 file's dynamic symbol table."""
+    offset, size, count = struct.unpack_from("<Q", data, 40)[0], *struct.unpack_from("<HH", data, 58)
+    sections = [struct.unpack_from("<IIQQQQIIQQ", data, offset + k * size) for k in range(count)]
+    symbols = next(s for s in sections if s[1] == 11)
+    names = sections[symbols[6]][4]
+    found = set()
+    for at in range(symbols[4], symbols[4] + symbols[5], 24):
+        name, info, _, section = struct.unpack_from("<IBBH", data, at)
+        if section and info >> 4:
+            found.add(data[names + name:data.index(b"\0", names + name)].decode())
+    return found
+
+
+def test_the_library_shows_the_functions_of_the_standard_and_nothing_else(fmu):
+    expected = {"fmi2" + name for name in COMMON + CO_SIMULATION}
+    data = fmu.binary.read_bytes()
+    if data[:4] == b"\x7fELF":
+        assert elf_exports(data) == expected
+    for name in expected:
+        assert hasattr(fmu.library, name)
+    assert not hasattr(fmu.library, "fmi2GetDerivatives")
+
+
+def test_version_and_platform(fmu):
+    for name, text in (("fmi2GetVersion", b"2.0"), ("fmi2GetTypesPlatform", b"default")):
+        function = getattr(fmu.library, name)
+        function.restype = c_char_p
+        assert function() == text
+
+
+# FMI 2.0, table in 4.2.4, for the states that this FMU can be in.
+ALLOWED = {
+    "SetDebugLogging": "instantiated initializationMode stepComplete terminated error",
+    "SetupExperiment": "instantiated",
+    "EnterInitializationMode": "instantiated",
+    "ExitInitializationMode": "initializationMode",
+    "Terminate": "stepComplete",
+    "Reset": "instantiated initializationMode stepComplete terminated error",
+    "GetReal": "initializationMode stepComplete terminated error",
+    "GetInteger": "initializationMode stepComplete terminated error",
+    "GetBoolean": "initializationMode stepComplete terminated error",
+    "GetString": "initializationMode stepComplete terminated error",
+    "SetReal": "instantiated initializationMode stepComplete",
+    "SetInteger": "instantiated initializationMode stepComplete",
+    "SetBoolean": "instantiated initializationMode stepComplete",
+    "SetString": "instantiated initializationMode stepComplete",
+    "GetFMUstate": "instantiated initializationMode stepComplete terminated error",
+    "FreeFMUstate": "instantiated initializationMode stepComplete terminated error",
+    "DoStep": "stepComplete",
+    "CancelStep": "",
+    "GetStatus": "stepComplete terminated",
+    "GetRealStatus": "stepComplete terminated",
+    "GetIntegerStatus": "stepComplete terminated",
+    "GetBooleanStatus": "stepComplete terminated",
+    "GetStringStatus": "stepComplete terminated",
+}
+
+
+def instance_in(state, fmu) -> Instance:
+    if state == "error":
+        return diverged(fmu)
+    instance = Instance(fmu)
+    if state == "initializationMode":
+        assert instance.call("EnterInitializationMode") == OK
+    elif state != "instantiated":
+        instance.start()
+        if state == "terminated":
+            assert instance.call("Terminate") == OK
+    return instance
+
+
+@pytest.mark.parametrize("state", ["instantiated", "initializationMode", "stepComplete", "terminated", "error"])
+def test_calls_are_allowed_where_the_standard_says(loose, state):
+    nothing, value = (None, c_size_t(0), None), (c_double * 1)()
+    arguments = {
+        "SetDebugLogging": (1, c_size_t(0), None), "SetupExperiment": (0, c_double(0), c_double(0), 0, c_double(0)),
+        "EnterInitializationMode": (), "ExitInitializationMode": (), "Terminate": (), "Reset": (),
+        **{get_or_set + kind: nothing for get_or_set in ("Get", "Set")
+           for kind in ("Real", "Integer", "Boolean", "String")},
+        "GetFMUstate": (byref(c_void_p()),), "FreeFMUstate": (byref(c_void_p()),),
+        "DoStep": (c_double(0), c_double(0.1), 0), "CancelStep": (),
+        "GetStatus": (0, value), "GetRealStatus": (2, value), "GetIntegerStatus": (2, value),
+        "GetBooleanStatus": (3, value), "GetStringStatus": (1, value),
+    }
+    assert set(arguments) == set(ALLOWED)
+    for function, states in ALLOWED.items():
+        instance = instance_in(state, loose)
+        said = len(instance.errors())
+        status = instance.call(function, *arguments[function])
+        if state in states.split():
+            assert status in (OK, DISCARD) and len(instance.errors()) == said, function
+        else:
+            assert status == ERROR, function
+            assert instance.errors()[said:] == [f"fmi2{function}: not allowed in state {state}"]
+            if state != "error":  # a refused call changes nothing
+                assert instance.call("GetReal" if state != "instantiated" else "SetReal", *nothing) == OK
+        instance.free()
+
+
+def test_no_instance_is_an_error_without_a_crash(fmu):
+    for name in COMMON + CO_SIMULATION:
+        if name not in ("GetTypesPlatform", "GetVersion", "Instantiate", "FreeInstance"):
+            assert getattr(fmu.library, "fmi2" + name)(None, *[None] * 7) == ERROR
+    fmu.library.fmi2FreeInstance(None)
+
+
+def test_what_is_not_built_is_refused_with_a_message(fmu):
+    instance = Instance(fmu).start()
+    state, size = instance.save(), c_size_t(7)
+    for function, arguments in (
+            ("SerializedFMUstateSize", (state, byref(size))), ("SerializeFMUstate", (state, None, c_size_t(0))),
+            ("DeSerializeFMUstate", (None, c_size_t(0), byref(state))),
+            ("GetDirectionalDerivative", (None, c_size_t(0), None, c_size_t(0), None, None)),
+            ("SetRealInputDerivatives", (None, c_size_t(0), None, None)),
+            ("GetRealOutputDerivatives", (None, c_size_t(0), None, None))):
+        assert instance.call(function, *arguments) == ERROR
+        assert instance.errors()[-1].startswith(f"fmi2{function}: not supported")
+    assert size.value == 7
+    assert instance.step(0, 0.01) == OK
+    instance.free()
+
+
+def test_status_of_a_step(fmu):
+    instance = Instance(fmu).start(time=1.0)
+    assert instance.step(1.0, 0.25) == OK
+    time, over = c_double(-1), c_int(-1)
+    assert instance.call("GetRealStatus", 2, byref(time)) == OK and time.value == 1.25
+    assert instance.call("GetBooleanStatus", 3, byref(over)) == OK and over.value == 0
+    assert instance.call("GetRealStatus", 0, byref(time)) == DISCARD and time.value == 1.25
+    assert instance.call("GetStringStatus", 1, byref(c_char_p())) == DISCARD
+    instance.free()
+
+
+def test_variables_are_real_only(fmu):
+    instance = Instance(fmu).start()
+    for kind in ("Integer", "Boolean", "String"):
+        for function in ("Get", "Set"):
+            assert instance.call(function + kind, (c_uint * 1)(0), c_size_t(1), (c_void_p * 1)()) == ERROR
+            assert instance.errors()[-1] == f"fmi2{function}{kind}: all variables are of type Real"
+    instance.free()
+
+
+# ------------------------------------------------------------------------------------------------------- instantiation
+
+def refused(fmu, **arguments) -> str:
+    instance = Instance(fmu, **arguments)
+    assert instance.component is None
+    assert [message[2:5] for message in instance.log] == [(ERROR, "logStatusError", "%s")]
+    return instance.log[0][5]
+
+
+def test_wrong_guid(fmu):
+    message = refused(fmu, guid="{wrong %s%n}")
+    assert fmu.description.guid in message and "{wrong %s%n}" in message
+
+
+def test_model_exchange_is_refused(fmu):
+    assert refused(fmu, kind=0) == "fmi2Instantiate: only co-simulation is supported"
+
+
+def test_missing_resource(fmu, tmp_path):
+    assert "cannot read" in refused(fmu, location=tmp_path.as_uri())
+    assert "scene.bin" in refused(fmu, location=str(tmp_path))
+    assert "http://" in refused(fmu, location="http://host/resources")
+    assert "otherhost" in refused(fmu, location="file://otherhost/resources")
+
+
+def test_null_arguments(fmu):
+    callbacks = Instance(fmu).callbacks
+    location = (fmu.folder / "resources").as_uri().encode()
+    good = [b"tie", 1, fmu.description.guid.encode(), location, byref(callbacks), 0, 0]
+    for place in (0, 2, 3, 4):
+        assert fmu.library.fmi2Instantiate(*good[:place], None, *good[place + 1:]) is None
+
+
+def test_a_logger_may_be_missing(fmu):
+    instance = Instance(fmu)
+    silent = type(instance.callbacks)()
+    location = (fmu.folder / "resources").as_uri().encode()
+    component = fmu.library.fmi2Instantiate(b"tie", 1, fmu.description.guid.encode(), location, byref(silent), 0, 1)
+    assert component
+    assert fmu.library.fmi2Terminate(c_void_p(component)) == ERROR
+    fmu.library.fmi2FreeInstance(c_void_p(component))
+    assert fmu.library.fmi2Instantiate(b"tie", 1, b"wrong", location, byref(silent), 0, 1) is None
+    instance.free()
+
+
+@pytest.mark.parametrize("form", ["{uri}", "{uri}/", "{single}", "{local}", "{path}", "{path}/"])
+def test_forms_of_the_resource_location(fmu, tmp_path, form):
+    folder = tmp_path / "a b%c ü"
+    folder.mkdir()
+    (folder / "scene.bin").write_bytes((fmu.folder / "resources" / "scene.bin").read_bytes())
+    uri = folder.as_uri()
+    location = form.format(uri=uri, single=uri.replace("file:///", "file:/"), path=folder,
+                           local=uri.replace("file:///", "file://localhost/"))
+    before = os.getcwd()
+    instance = Instance(fmu, location=location)
+    assert instance.component, instance.log
+    assert os.getcwd() == before
+    instance.free()
+
+
+def checksum(body: bytes) -> int:
+    value = 14695981039346656037
+    for byte in body:
+        value = (value ^ byte) * 1099511628211 % 2**64
+    return value
+
+
+def test_damaged_resources_end_in_a_message(loose, tmp_path):
+    """Cut anywhere; any byte changed; and changed with the checksum put right, so that the reader itself must see it."""
+    good = (loose.folder / "resources" / "scene.bin").read_bytes()
+    header = len(b"tiefmu scene\n") + 4 + 8 + 8
+    rng = np.random.default_rng(7)
+
+    def attempt(data):
+        (tmp_path / "scene.bin").write_bytes(data)
+        return Instance(loose, location=str(tmp_path))
+
+    for length in [*range(header + 2), *rng.integers(header, len(good), 50)]:
+        assert attempt(good[:length]).component is None
+    for at in [*range(header), *rng.integers(header, len(good), 50)]:
+        assert attempt(good[:at] + bytes([good[at] ^ rng.integers(1, 256)]) + good[at + 1:]).component is None
+    accepted = 0
+    for _ in range(400):
+        body = bytearray(good[header:])
+        for at in rng.integers(1, len(body), rng.integers(1, 4)):
+            body[at] = rng.choice([0, 1, 0x7f, 0x80, 0xff, rng.integers(256)])
+        instance = attempt(good[:header - 8] + struct.pack("<Q", checksum(body)) + bytes(body))
+        if instance.component:  # a changed number, say
+            accepted += 1
+            instance.free()
+        else:
+            assert len(instance.log) == 1 and "\n" not in instance.log[0][5]
+    assert 0 < accepted < 400
+
+
+# -------------------------------------------------------------------------------------------------------- get and set
+
+def test_gets_in_any_order_give_the_same(any_fmu):
+    rng = np.random.default_rng(8)
+    instance = Instance(any_fmu).start(values=random_values(any_fmu, rng, any_fmu.names("input")))
+    assert instance.step(0, 0.01) == OK
+    count = len(any_fmu.reference)
+    status, everything = instance.get_references(range(count))
+    assert status == OK and np.isfinite(everything).all()
+    for order in (rng.permutation(count), rng.integers(0, count, 3 * count), np.arange(count)[::-1]):
+        np.testing.assert_array_equal(instance.get_references(order.tolist())[1], everything[order])
+    assert instance.get_references([])[0] == OK
+    instance.free()
+
+
+def test_sets_in_any_order_arrive(any_fmu):
+    rng = np.random.default_rng(9)
+    instance = Instance(any_fmu).start()
+    inputs = np.array([any_fmu.reference[name] for name in any_fmu.names("input")])
+    for order in (np.sort(inputs), rng.permutation(inputs), inputs):
+        values = rng.normal(size=len(order))
+        assert instance.set_references(order.tolist(), values.tolist()) == OK
+        np.testing.assert_array_equal(instance.get_references(order.tolist())[1], values)
+    instance.free()
+
+
+def test_outputs_follow_inputs_at_the_same_time(tmp_path, fmu):
+    instance = Instance(fmu).start()
+    before = instance.get(["master[1].f[1]", "slave[1].v[1]"])
+    assert instance.set({"slave[1].f[1]": 5.0, "master[1].v[1]": 2.0, "master[2].v[1]": 2.0}) == OK
+    assert (instance.get(["master[1].f[1]", "slave[1].v[1]"]) != before).all()
+    instance.free()
+
+
+@pytest.mark.parametrize("value, text", [(np.nan, "NaN"), (np.inf, "an infinite value"), (-np.inf, "an infinite value")])
+def test_values_that_are_not_finite_change_nothing(fmu, value, text):
+    instance = Instance(fmu).start(values={"slave[1].f[1]": 1.5})
+    names = fmu.names("input")
+    before = instance.get(names + fmu.names("output"))
+    values = dict.fromkeys(names, 3.0) | {"slave[2].f[3]": value}
+    assert instance.set(values) == ERROR
+    assert instance.errors() == [f"fmi2SetReal: variable 'slave[2].f[3]' cannot be set to {text}"]
+    np.testing.assert_array_equal(instance.get(names + fmu.names("output")), before)
+    assert instance.step(0, 0.01) == OK
+    instance.free()
+
+
+def test_unknown_value_references(fmu):
+    instance = Instance(fmu).start()
+    count = len(fmu.reference)
+    good = fmu.reference["slave[1].f[1]"]
+    for wrong in (count, 2**32 - 1):
+        assert instance.set_references([good, wrong], [9.0, 9.0]) == ERROR
+        assert instance.errors()[-1] == f"fmi2SetReal: unknown value reference {wrong}; there are {count}"
+        assert instance.get_references([good, wrong])[0] == ERROR
+    assert instance.get(["slave[1].f[1]"])[0] == 0
+    instance.free()
+
+
+def test_null_arrays(fmu):
+    instance = Instance(fmu).start()
+    reference, value = (c_uint * 1)(0), (c_double * 1)()
+    for function in ("GetReal", "SetReal"):
+        assert instance.call(function, None, c_size_t(1), value) == ERROR
+        assert instance.call(function, reference, c_size_t(1), None) == ERROR
+        assert instance.call(function, None, c_size_t(0), None) == OK
+    assert instance.call("GetFMUstate", None) == ERROR
+    assert instance.call("GetRealStatus", 2, None) == ERROR
+    instance.free()
+
+
+def test_only_inputs_and_in_time_parameters_can_be_set(fmu):
+    instance = Instance(fmu)
+    for states, parameter in (("instantiated", OK), ("initialization", OK), ("step", ERROR)):
+        if states == "initialization":
+            assert instance.call("EnterInitializationMode") == OK
+        if states == "step":
+            assert instance.call("ExitInitializationMode") == OK
+        assert instance.set({"slave[1].f[1]": 0.5}) == OK
+        for name, why in (("slave[1].v[1]", "is an output"), ("master[3].v[2]", "is an output"),
+                          ("master[1].added_mass", "is calculated"), ("stable_time_step", "is an output")):
+            assert instance.set({"slave[1].f[1]": 0.7, name: 1.0}) == ERROR
+            assert instance.errors()[-1] == f"fmi2SetReal: variable '{name}' {why} and cannot be set"
+        assert instance.set({"slave[1].mass": 1.25}) == parameter
+    assert instance.errors()[-1] == ("fmi2SetReal: variable 'slave[1].mass' is fixed after the initialisation and "
+                                     "cannot be set")
+    assert instance.get(["slave[1].f[1]", "slave[1].mass"]).tolist() == [0.5, 1.25]
+    instance.free()
+
+
+def test_parameters_act_at_once_in_initialization_mode(loose):
+    instance = Instance(loose)
+    assert instance.set({"slave[1].mass": 2.0}) == OK
+    assert instance.call("EnterInitializationMode") == OK
+    first = instance.get(["master[1].added_mass", "master[2].added_mass"])
+    assert instance.set({"slave[1].mass": 4.0}) == OK
+    np.testing.assert_allclose(instance.get(["master[1].added_mass", "master[2].added_mass"]), 2 * first, rtol=1e-15)
+    assert instance.call("ExitInitializationMode") == OK
+    np.testing.assert_allclose(instance.get(["master[1].added_mass"]), 2 * first[:1], rtol=1e-15)
+    instance.free()
+
+
+def test_parameters_that_make_no_sense_are_an_error_and_reset_recovers(loose):
+    instance = Instance(loose)
+    assert instance.set({"slave[1].mass": -40.0}) == OK
+    assert instance.call("EnterInitializationMode") == OK
+    assert instance.call("ExitInitializationMode") == ERROR
+    assert instance.errors()[-1].startswith("fmi2ExitInitializationMode: ")
+    assert instance.call("Reset") == OK
+    instance.start()
+    assert instance.get(["slave[1].mass"])[0] == 1.0
+    instance.free()
+
+
+# -------------------------------------------------------------------------------------------------------------- steps
+
+def test_refused_steps(fmu):
+    instance = Instance(fmu).start(time=2.0, stop=3.0)
+    for time, size in ((2.0, 0.0), (2.0, -0.1), (2.0, np.nan), (2.0, np.inf), (1.9, 0.1), (2.1, 0.1), (np.nan, 0.1),
+                       (2.0, 1.1)):
+        assert instance.step(time, size) == ERROR
+        assert instance.errors()[-1].startswith("fmi2DoStep: the step ")
+    assert len(instance.errors()) == 8
+    assert instance.step(2.0, 0.5) == OK
+    assert instance.step(2.0, 0.5) == ERROR  # that one is done
+    assert instance.step(2.5 * (1 + 1e-15), 0.5) == OK  # another rounding of the same point
+    assert instance.step(3.0, 1e-3) == ERROR
+    instance.free()
+
+
+def test_experiments_that_make_no_sense(fmu):
+    instance = Instance(fmu)
+    for start, stop in ((np.nan, 1.0), (np.inf, np.inf), (1.0, 0.5), (0.0, np.nan)):
+        assert instance.call("SetupExperiment", 0, c_double(0), c_double(start), 1, c_double(stop)) == ERROR
+    assert instance.call("SetupExperiment", 0, c_double(0), c_double(-1.0), 0, c_double(0)) == OK
+    instance.free()
+
+
+def test_divergence_is_an_error_that_reset_and_a_saved_state_undo(loose):
+    instance = Instance(loose).start()
+    good = instance.save()
+    names = loose.names("output")
+    before = instance.get(names)
+    assert instance.set({"slave[1].f[1]": 1e30}) == OK
+    assert instance.step(0, 1.0) == ERROR
+    assert instance.errors()[-1].startswith("fmi2DoStep: diverged at t = ")
+    assert instance.step(0, 1.0) == ERROR
+    assert instance.restore(good) == OK
+    np.testing.assert_array_equal(instance.get(names), before)
+    assert instance.step(0, 1.0) == OK
+
+    assert instance.set({"slave[1].f[1]": 1e30}) == OK
+    assert instance.step(1.0, 1.0) == ERROR
+    assert instance.call("Reset") == OK
+    instance.start()
+    np.testing.assert_array_equal(instance.get(names), before)
+    instance.free()
+
+
+# ----------------------------------------------------------------------------------- saved states, instances and reset
+
+def run(instances, fmu, rng, steps=40, time=0.0):
+    """The same irregular run in every instance, step by step; the last outputs and the time."""
+    inputs = fmu.names("input")
+    for _ in range(steps):
+        size = rng.choice([0.001, 0.0037, 0.02])
+        values = random_values(fmu, rng, inputs) if rng.uniform() < 0.5 else {}
+        for instance in instances:
+            assert instance.set(values) == OK
+            assert instance.step(time, size) == OK, instance.errors()
+        time += size
+    return [instance.get_references(range(len(fmu.reference)))[1] for instance in instances], time
+
+
+def test_a_restored_state_continues_with_the_same_bits(any_fmu):
+    instance = Instance(any_fmu).start()
+    _, time = run([instance], any_fmu, np.random.default_rng(10))
+    state = instance.save()
+    (first,), _ = run([instance], any_fmu, np.random.default_rng(11), time=time)
+    for _ in range(2):
+        assert instance.restore(state) == OK
+        (again,), _ = run([instance], any_fmu, np.random.default_rng(11), time=time)
+        np.testing.assert_array_equal(again, first)
+    assert instance.call("FreeFMUstate", byref(state)) == OK and not state
+    instance.free()
+
+
+def test_a_state_is_saved_with_inputs_that_outputs_do_not_show_yet(any_fmu):
+    instance = Instance(any_fmu).start()
+    assert instance.set(random_values(any_fmu, np.random.default_rng(12), any_fmu.names("input"))) == OK
+    state = instance.save()
+    names = any_fmu.names("output")
+    expected = instance.get(names)
+    run([instance], any_fmu, np.random.default_rng(13))
+    assert instance.restore(state) == OK
+    np.testing.assert_array_equal(instance.get(names), expected)
+    instance.free()
+
+
+def test_a_state_holds_the_state_of_the_machine(fmu):
+    instance = Instance(fmu)
+    fresh = instance.save()
+    assert instance.call("EnterInitializationMode") == OK
+    assert instance.set({"slave[1].mass": 2.0}) == OK
+    entered = instance.save()
+    assert instance.call("ExitInitializationMode") == OK
+    assert instance.step(0, 0.01) == OK
+    assert instance.restore(entered) == OK
+    assert instance.step(0, 0.01) == ERROR
+    assert instance.set({"slave[1].mass": 3.0}) == OK
+    assert instance.get(["slave[1].mass"])[0] == 3.0
+    assert instance.restore(fresh) == OK
+    (first,), _ = run([instance.start()], fmu, np.random.default_rng(14))
+    other = Instance(fmu)
+    (second,), _ = run([other.start()], fmu, np.random.default_rng(14))
+    np.testing.assert_array_equal(first, second)
+    instance.free()
+    other.free()
+
+
+def test_handles_of_states(fmu):
+    instance, other = Instance(fmu).start(), Instance(fmu).start()
+    state = instance.save()
+    handle = state.value
+    assert instance.save(state).value == handle  # written over
+    for wrong in (other.save(), c_void_p(1), c_void_p(None)):
+        assert instance.restore(wrong) == ERROR
+    assert instance.call("FreeFMUstate", byref(c_void_p(1))) == ERROR
+    assert instance.call("FreeFMUstate", byref(state)) == OK
+    assert instance.call("FreeFMUstate", byref(state)) == OK  # now null: ignored
+    assert instance.call("FreeFMUstate", None) == OK
+    assert instance.restore(c_void_p(handle)) == ERROR
+    instance.free()
+    other.free()
+
+
+def test_interleaved_instances_do_not_disturb_one_another(any_fmu):
+    alone = [Instance(any_fmu).start(), Instance(any_fmu).start()]
+    single = [run([instance], any_fmu, np.random.default_rng(15 + k))[0][0] for k, instance in enumerate(alone)]
+    pair = [Instance(any_fmu).start(), Instance(any_fmu).start()]
+    rngs, times = [np.random.default_rng(15), np.random.default_rng(16)], [0.0, 0.0]
+    for _ in range(40):
+        for k in range(2):
+            (last,), times[k] = run([pair[k]], any_fmu, rngs[k], steps=1, time=times[k])
+            if k == 0:
+                first = last
+    np.testing.assert_array_equal(first, single[0])
+    np.testing.assert_array_equal(last, single[1])
+    for instance in alone + pair:
+        instance.free()
+
+
+def test_reset_repeats_the_first_run(any_fmu):
+    instance = Instance(any_fmu, logging=True).start(time=0.0)
+    (first,), _ = run([instance], any_fmu, np.random.default_rng(17))
+    assert instance.call("Reset") == OK
+    assert instance.step(0, 0.01) == ERROR
+    (second,), _ = run([instance.start()], any_fmu, np.random.default_rng(17))
+    np.testing.assert_array_equal(first, second)
+    instance.free()
+
+
+def test_many_instances_in_any_order_of_death(fmu):
+    instances = [Instance(fmu, name=f"tie {k}").start() for k in range(20)]
+    results, _ = run(instances, fmu, np.random.default_rng(18), steps=5)
+    for result in results:
+        np.testing.assert_array_equal(result, results[0])
+    for k in np.random.default_rng(19).permutation(20):
+        instances[k].free()
+
+
+# ------------------------------------------------------------------------------------------------------------ messages
+
+def test_messages_are_arguments_and_reach_their_owner(fmu):
+    instance = Instance(fmu, name="a %s%n%d", environment=0x1234)
+    assert instance.call("Terminate") == ERROR
+    assert instance.log == [(0x1234, "a %s%n%d", ERROR, "logStatusError", "%s",
+                             "fmi2Terminate: not allowed in state instantiated")]
+    instance.free()
+
+
+def test_logging_is_off_until_asked_for_but_errors_come_always(fmu):
+    quiet, loud = Instance(fmu, logging=False).start(), Instance(fmu, logging=True).start()
+    assert quiet.log == []
+    assert {message[3] for message in loud.log} >= {"logStability"}
+    assert quiet.call("EnterInitializationMode") == ERROR
+    assert len(quiet.errors()) == 1
+    quiet.free()
+    loud.free()
+
+
+def test_categories_choose_what_is_logged(fmu):
+    def categories(*names, on=True):
+        instance = Instance(fmu)
+        array = (c_char_p * len(names))(*(name.encode() for name in names))
+        assert instance.call("SetDebugLogging", int(on), c_size_t(len(names)), array) == OK
+        instance.start()
+        found = {message[3] for message in instance.log}
+        instance.free()
+        return found
+
+    assert categories("logStability") == {"logStability"}
+    assert categories("logStatusError", "logTie") <= {"logTie"}
+    assert categories() == categories("logAll") >= {"logStability"}
+    assert categories("logAll", on=False) == set()
+    declared = {category.name for category in fmu.description.logCategories}
+    assert declared == {"logStatusError", "logStatusWarning", "logTie", "logStability", "logAll"}
+
+
+def test_findings_about_the_tie_are_logged(tmp_path):
+    scene = {"mesh": {"nodes": [[1, 0, 0, 0], [2, 1, 0, 0], [3, 1, 1, 0], [4, 0, 1, 0], [101, 0.3, 0.6, 0.4]],
+                      "segments": [[1, 1, 2, 3, 4]]}, "tie": [{"name": "tie", "slaves": [101]}]}
+    instance = Instance(Fmu(scene, tmp_path), logging=True).start()
+    messages = [message for message in instance.log if message[3] == "logTie"]
+    assert any("slave 101" in message[5] or "offset" in message[5] for message in messages)
+    instance.free()
+
+
+def test_unknown_categories_are_refused(fmu):
+    instance = Instance(fmu)
+    assert instance.call("SetDebugLogging", 1, c_size_t(1), (c_char_p * 1)(b"logEvents")) == ERROR
+    assert instance.errors() == ["fmi2SetDebugLogging: unknown log category 'logEvents'"]
+    assert instance.call("SetDebugLogging", 1, c_size_t(1), None) == ERROR
+    assert instance.call("SetDebugLogging", 1, c_size_t(1), (c_char_p * 1)(None)) == ERROR
+    instance.start()
+    assert {message[3] for message in instance.log} == {"logStatusError"}
+    instance.free()
+
+
+# ---------------------------------------------------------------------------------------------------------------- FMPy
+
+@pytest.mark.parametrize("irregular", [False, True])
+def test_fmpy_simulates_it_as_the_calls_do(any_fmu, irregular):
+    rng = np.random.default_rng(20)
+    names = any_fmu.names("output")
+    start = random_values(any_fmu, rng, any_fmu.names("input"))
+    times = np.concatenate([[0], np.cumsum(rng.choice([1, 2, 5], 40))]) * 1e-3 if irregular else np.arange(41) * 5e-3
+    instance = Instance(any_fmu).start(values=start)
+    rows = [instance.get(names)]
+    for a, b in zip(times[:-1], times[1:]):
+        assert instance.step(a, b - a) == OK
+        rows.append(instance.get(names))
+    if irregular:
+        result = []
+        slave = fmpy.fmi2.FMU2Slave(guid=any_fmu.description.guid, unzipDirectory=str(any_fmu.folder),
+                                    modelIdentifier=any_fmu.description.coSimulation.modelIdentifier)
+        slave.instantiate()
+        slave.setupExperiment(startTime=0.0)
+        slave.setReal([any_fmu.reference[name] for name in start], list(start.values()))
+        slave.enterInitializationMode()
+        slave.exitInitializationMode()
+        references = [any_fmu.reference[name] for name in names]
+        result.append(slave.getReal(references))
+        for a, b in zip(times[:-1], times[1:]):
+            slave.doStep(currentCommunicationPoint=a, communicationStepSize=b - a)
+            result.append(slave.getReal(references))
+        slave.terminate()
+        slave.fmi2FreeInstance(slave.component)
+    else:
+        table = fmpy.simulate_fmu(str(any_fmu.path), start_values=start, output=names, stop_time=0.2,
+                                  output_interval=5e-3)
+        np.testing.assert_allclose(table["time"], times, rtol=1e-12)
+        result = [[row[name] for name in names] for row in table]
+    np.testing.assert_allclose(result, rows, rtol=0 if irregular else 1e-9, atol=0 if irregular else 1e-9)
+    instance.free()
