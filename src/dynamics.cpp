@@ -99,17 +99,6 @@ TieGeometry Dynamics::geometry(std::size_t g) const {
   return {turning ? data + layout[Field::offset].offset : model.slaveOffset.data(), frames_.data() + firstFrame_[g]};
 }
 
-template <class Body>
-void Dynamics::eachGroup(Body body) const {
-  for (std::size_t g = 0; g < model.groups.size(); ++g)
-    body(model.groups[g], SegmentRange{0, model.groups[g].segments()}, geometry(g), g);
-}
-
-template <class Body>
-void Dynamics::eachSprung(Body body) const {
-  for (const Sprung& s : sprung_) body(model.groups[s.group], s.range, geometry(s.group), s.group);
-}
-
 void Dynamics::setStart() {
   std::fill(data, data + layout.size, 0.0);
   *field(Field::timeStep) = model.settings.timeStep;
@@ -213,11 +202,9 @@ EndMotion Dynamics::motion(const SpringEnd& end, const Spring& spring, const dou
   return m;
 }
 
-namespace {
-
-// Adds a force and a moment where an end takes them; a moment on an end that cannot turn is lost (and was warned of).
-void addTo(const Model& model, const SpringEnd& end, const Vec3& force, const Vec3& moment, double* f, double* t,
-           double* fs, double* ms) {
+// A moment on an end that cannot turn is lost (compile warned of it).
+void Dynamics::addTo(const SpringEnd& end, const Vec3& force, const Vec3& moment, double* f, double* t, double* fs,
+                     double* ms) const {
   if (end.node >= 0) {
     at(f, end.node) += force;
     if (end.node < model.rotating()) at(t, end.node) += moment;
@@ -226,8 +213,6 @@ void addTo(const Model& model, const SpringEnd& end, const Vec3& force, const Ve
     if (end.slave < model.turning()) at(ms, end.slave) += moment;
   }
 }
-
-}  // namespace
 
 void Dynamics::gatherLoads() {
   const double *force = field(Field::slaveForce), *moment = field(Field::slaveMoment);
@@ -259,8 +244,8 @@ void Dynamics::gatherLoads() {
   });
   for (const Spring& spring : model.springs) {
     const SpringLoad l = springLoad(spring, motion(spring.a, spring, v, w), motion(spring.b, spring, v, w));
-    addTo(model, spring.a, l.fa, l.ta, nodeLoad_.data(), nodeMoment_.data(), load_.data(), moment_.data());
-    addTo(model, spring.b, l.fb, l.tb, nodeLoad_.data(), nodeMoment_.data(), load_.data(), moment_.data());
+    addTo(spring.a, l.fa, l.ta, nodeLoad_.data(), nodeMoment_.data(), load_.data(), moment_.data());
+    addTo(spring.b, l.fb, l.tb, nodeLoad_.data(), nodeMoment_.data(), load_.data(), moment_.data());
     strain_ += l.energy;
     dissipation_ += l.dissipation;
   }
@@ -580,8 +565,8 @@ void Dynamics::springOperator(const double* u, const double* turn, double* f, do
   for (const Spring& spring : model.springs) {
     const SpringLoad l =
         springTangent(spring, motion(spring.a, spring, u, turn), motion(spring.b, spring, u, turn), damping);
-    addTo(model, spring.a, -l.fa, -l.ta, f, t, tangent_.data(), tangentMoment_.data());
-    addTo(model, spring.b, -l.fb, -l.tb, f, t, tangent_.data(), tangentMoment_.data());
+    addTo(spring.a, -l.fa, -l.ta, f, t, tangent_.data(), tangentMoment_.data());
+    addTo(spring.b, -l.fb, -l.tb, f, t, tangent_.data(), tangentMoment_.data());
   }
   eachSprung([&](const TieGroup& group, SegmentRange range, TieGeometry shape, std::size_t) {
     distribute(group, range, shape, tangent_.data(), tangentMoment_.data(), f, t);

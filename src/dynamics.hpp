@@ -59,9 +59,16 @@ class Dynamics {
   // M^-1 of the free nodes, in place on node arrays.
   void solveInertia(double* f, double* t);
 
+  // Change of every output, in `dot` laid out like `data`, with the inputs' change given there. Outputs must be up to
+  // date. Allocates at the first call.
+  void directional(double* dot);
+
   std::int64_t evaluations = 0;
 
  private:
+  struct Change;
+  void changeAccelerations(Change& change, const double* da, const double* dz, const double* a, const double* v,
+                           const double* w, const double* du, const double* dturn, const double* dx);
   struct Sprung { int group; SegmentRange range; };
   TieGeometry geometry(std::size_t g) const;
   template <class Body> void eachGroup(Body body) const;   // body(group, all its segments, geometry, index)
@@ -70,6 +77,8 @@ class Dynamics {
   EndMotion motion(const SpringEnd& end, const Spring& spring, const double* v, const double* w) const;
   const double* quaternion(int index) const;
   void gatherLoads();
+  void addTo(const SpringEnd& end, const Vec3& force, const Vec3& moment, double* f, double* t, double* fs,
+             double* ms) const;
   void distributeLoads(const double* force, const double* moment, double* f, double* t);
   void slaveAccelerations(const double* a, const double* z, const double* v, const double* w);
   void inertialLoads();
@@ -94,6 +103,18 @@ class Dynamics {
   double strain_ = 0, dissipation_ = 0;
   bool gravity_ = false, offsetsTurn_ = false, bias_ = false, knownAccelerations_ = false, drivenMove_ = true;
   std::unique_ptr<ConsistentInertia> inertia_;
+  std::shared_ptr<Change> change_;  // scratch of `directional`, made at its first call
 };
+
+template <class Body>
+void Dynamics::eachGroup(Body body) const {
+  for (std::size_t g = 0; g < model.groups.size(); ++g)
+    body(model.groups[g], SegmentRange{0, model.groups[g].segments()}, geometry(g), g);
+}
+
+template <class Body>
+void Dynamics::eachSprung(Body body) const {
+  for (const Sprung& s : sprung_) body(model.groups[s.group], s.range, geometry(s.group), s.group);
+}
 
 }  // namespace tiefmu

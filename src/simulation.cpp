@@ -282,6 +282,11 @@ void Simulation::updateOutputs() {
   s.outputsOld = false;
 }
 
+void Simulation::directional(double* change) {
+  updateOutputs();
+  impl_->dynamics.directional(change);
+}
+
 void Simulation::save(State& state) const {
   const Impl& s = *impl_;
   state.data.assign(s.data.begin(), s.data.end());

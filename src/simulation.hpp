@@ -55,6 +55,10 @@ class Simulation {
   void save(State& state) const;
   void restore(const State& state);
 
+  // Directional derivative at the present state: `change` is laid out like `data`; on entry it holds a change of the
+  // inputs and zeros elsewhere, on return that of every output. Free nodes' motion is a state and does not change.
+  void directional(double* change);
+
   // Forces evaluated so far (a machine-independent cost).
   std::int64_t evaluations() const;
   // Largest step the chosen integrator is stable at, damping included, s (1e30: none).

@@ -59,4 +59,31 @@ SpringLoad springTangent(const Spring& spring, const EndMotion& a, const EndMoti
   return load;
 }
 
+SpringLoad springChange(const Spring& spring, const EndMotion& a, const EndMotion& b, const EndMotion& da,
+                        const EndMotion& db) {
+  SpringLoad change;
+  const Vec3 line = a.x - b.x, dLine = da.x - db.x;
+  if (spring.kind == SpringKind::axial) {
+    const double length = line.norm();
+    if (!(length > 0)) return change;
+    const Vec3 n = line / length, dn = (dLine - n.dot(dLine) * n) / length;
+    const double k = spring.stiffness[0], c = spring.damping[0], elongation = length - spring.length;
+    const double tension = k * elongation + c * n.dot(a.v - b.v);
+    const double dTension = k * n.dot(dLine) + c * (dn.dot(a.v - b.v) + n.dot(da.v - db.v));
+    change.fb = dTension * n + tension * dn;
+    change.fa = -change.fb;
+    change.energy = k * elongation * n.dot(dLine);
+    return change;
+  }
+  const SpringLoad load = springLoad(spring, a, b);
+  const Vec3 dRate = da.v - db.v - db.w.cross(line) - b.w.cross(dLine);
+  const Vec3 elastic = spring.stiffness.cwiseProduct(line - b.q * spring.arm);
+  change.fb = spring.stiffness.cwiseProduct(dLine) + spring.damping.cwiseProduct(dRate);
+  change.fa = -change.fb;
+  change.ta = spring.rotationalDamping.cwiseProduct(db.w - da.w);
+  change.tb = dLine.cross(load.fb) + line.cross(change.fb) - change.ta;
+  change.energy = elastic.dot(dLine);
+  return change;
+}
+
 }  // namespace tiefmu

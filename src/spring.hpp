@@ -28,4 +28,9 @@ SpringLoad springLoad(const Spring& spring, const EndMotion& a, const EndMotion&
 // coefficients in place of the stiffness. Symmetric and positive semidefinite.
 SpringLoad springTangent(const Spring& spring, const EndMotion& a, const EndMotion& b, bool damping);
 
+// Change of springLoad when the ends' x, v and w change by da and db (their rotations stay): exact, to first order.
+// `energy` is the change of the stored energy.
+SpringLoad springChange(const Spring& spring, const EndMotion& a, const EndMotion& b, const EndMotion& da,
+                        const EndMotion& db);
+
 }  // namespace tiefmu

@@ -143,10 +143,7 @@ Spectrum::Value Spectrum::lanczos(bool damping, double* mode, int vectors) {
       }
     beta = std::sqrt(std::max(0.0, x.dot(p)));
     const double scale = tridiagonal.diagonal().head(used).cwiseAbs().maxCoeff();
-    if (!(beta > 1e-14 * scale)) {
-      beta = 0;
-      break;
-    }
+    if (!(beta > 1e-11 * scale)) break;  // the space is exhausted: what is left is rounding
     if (used < vectors) tridiagonal(j, j + 1) = tridiagonal(j + 1, j) = beta;
     x /= beta;
     p /= beta;

@@ -69,4 +69,13 @@ void rotateOffsets(const TieGroup& group, SegmentRange range, const double* rota
 void meanSpin(const TieGroup& group, SegmentRange range, const SegmentFrame* frame, const double* velocity,
               double* spin);
 
+// Changes with the nodes' positions, which only meanMotion couplings feel (dx: 3 per node, m). Each adds to its result.
+//   followChange: (dT) u    distributeChange: (dT)^T (F, M)    biasChange: db
+void followChange(const TieGroup& group, TieGeometry geometry, const double* dx, const double* u, double* us,
+                  double* turns);
+void distributeChange(const TieGroup& group, TieGeometry geometry, const double* dx, const double* force,
+                      const double* moment, double* f);
+void biasChange(const TieGroup& group, TieGeometry geometry, const double* dx, const double* velocity, double* as,
+                double* zs);
+
 }  // namespace tiefmu

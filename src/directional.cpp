@@ -1,0 +1,226 @@
+// Directional derivatives of the outputs: the pipeline of dynamics.cpp, differentiated.
+#include <algorithm>
+
+#include "dynamics.hpp"
+
+namespace tiefmu {
+
+struct Dynamics::Change {
+  std::vector<double> u, turn;               // nodes: a motion whose free part is zero
+  std::vector<double> v, w;                  // values to perturb the quadratic bias about
+  std::vector<double> xs, us, turns;         // slaves: positions, velocities
+  std::vector<double> load, moment;          // f_s
+  std::vector<double> node, nodeMoment;      // loads on nodes
+  std::vector<double> as, zs, other, otherTurn;
+  std::vector<double> f, t, zero;
+
+  explicit Change(const Model& model) {
+    const std::size_t n = 3 * static_cast<std::size_t>(model.nodes()), r = 3 * static_cast<std::size_t>(model.rotating());
+    const std::size_t s = 3 * static_cast<std::size_t>(model.slaves()), k = 3 * static_cast<std::size_t>(model.turning());
+    for (auto* a : {&u, &v, &node, &f}) a->resize(n);
+    for (auto* a : {&turn, &w, &nodeMoment, &t}) a->resize(r);
+    for (auto* a : {&xs, &us, &load, &as, &other, &zero}) a->resize(s);
+    for (auto* a : {&turns, &moment, &zs, &otherTurn}) a->resize(k);
+  }
+};
+
+// Accelerations of the slaves change by T dq'' + (dT) q'' + db into change.as, zs. `v`, `w`: of the bias; its change
+// with the driven velocities du, dturn is half the difference between both sides, exact for a quadratic form.
+void Dynamics::changeAccelerations(Change& c, const double* da, const double* dz, const double* a,
+                                   const double* v, const double* w, const double* du, const double* dturn,
+                                   const double* dx) {
+  eachGroup([&](const TieGroup& group, SegmentRange range, TieGeometry shape, std::size_t) {
+    if (da) follow(group, range, shape, da, dz, c.as.data(), c.zs.data());
+    if (dx && a) followChange(group, shape, dx, a, c.as.data(), c.zs.data());
+    if (dx && bias_) biasChange(group, shape, dx, v, c.as.data(), c.zs.data());
+  });
+  if (!bias_) return;
+  double largest = 0, size = 0;
+  for (int k = 0; k < 3 * model.nodes(); ++k) {
+    largest = std::max(largest, std::abs(du[k]));
+    size = std::max(size, std::abs(v[k]));
+  }
+  for (int k = 0; k < 3 * model.rotating(); ++k) {
+    largest = std::max(largest, std::abs(dturn[k]));
+    size = std::max(size, std::abs(w[k]));
+  }
+  if (largest == 0 || size == 0) return;
+  const double scale = size / largest;  // both sides of the same size as the motion: least rounding
+  for (double side : {scale, -scale}) {
+    for (int k = 0; k < 3 * model.nodes(); ++k) c.v[k] = v[k] + side * du[k];
+    for (int k = 0; k < 3 * model.rotating(); ++k) c.w[k] = w[k] + side * dturn[k];
+    std::fill(c.other.begin(), c.other.end(), 0.0);
+    std::fill(c.otherTurn.begin(), c.otherTurn.end(), 0.0);
+    eachGroup([&](const TieGroup& group, SegmentRange range, TieGeometry shape, std::size_t) {
+      addBias(group, range, shape, c.v.data(), c.w.data(), c.other.data(), c.otherTurn.data());
+    });
+    for (std::size_t k = 0; k < c.as.size(); ++k) c.as[k] += c.other[k] / (2 * side);
+    for (std::size_t k = 0; k < c.zs.size(); ++k) c.zs[k] += c.otherTurn[k] / (2 * side);
+  }
+}
+
+void Dynamics::directional(double* dot) {
+  if (!change_) change_ = std::make_shared<Change>(model);
+  Change& c = *change_;
+  const auto seed = [&](Field f) { return dot + layout[f].offset; };
+  const int first = 3 * model.freeBegin(), last = 3 * model.freeEnd();
+  const int turning = 3 * model.rotating();
+  const bool consistent = model.settings.inertia == Inertia::consistent;
+  const double *mass = field(Field::slaveMass), *inertia = field(Field::slaveInertia);
+  const double *a = has(Field::acceleration) ? field(Field::acceleration) : nullptr;
+  const double *z = field(Field::angularAcceleration);
+  const double *v = field(Field::velocity), *w = field(Field::spin);
+  const double *du = seed(Field::velocity), *dturn = seed(Field::spin);
+  const double* dx = nullptr;
+  if (has(Field::position) && !drivenMove_) dx = seed(Field::position);
+  const double* shapeChange = model.finite() ? dx : nullptr;
+
+  // f_s
+  std::copy_n(seed(Field::slaveForce), c.load.size(), c.load.begin());
+  std::copy_n(seed(Field::slaveMoment), c.moment.size(), c.moment.begin());
+  std::fill(c.node.begin(), c.node.end(), 0.0);
+  std::fill(c.nodeMoment.begin(), c.nodeMoment.end(), 0.0);
+  if (has(Field::nodeForce)) {
+    std::copy(seed(Field::nodeForce) + first, seed(Field::nodeForce) + last, c.node.begin() + first);
+    std::copy(seed(Field::nodeMoment) + first, seed(Field::nodeMoment) + turning, c.nodeMoment.begin() + first);
+  }
+  double strain = 0;
+  if (!model.springs.empty() || has(Field::slavePosition)) {
+    std::fill(c.xs.begin(), c.xs.end(), 0.0);
+    eachGroup([&](const TieGroup& group, SegmentRange range, TieGeometry shape, std::size_t) {
+      if (!dx) return;
+      if (model.finite()) return place(group, range, {c.zero.data(), shape.frame}, dx, c.xs.data());
+      std::fill(c.t.begin(), c.t.end(), 0.0);
+      follow(group, range, shape, dx, c.t.data(), c.xs.data(), c.otherTurn.data());
+    });
+    if (has(Field::slavePosition)) std::copy(c.xs.begin(), c.xs.end(), seed(Field::slavePosition));
+  }
+  if (!model.springs.empty()) {
+    const double *vl = velocityFor(Field::lagged), *wl = spinFor(Field::lagged);
+    placeSlaves(xs_.data(), true);
+    eachSprung([&](const TieGroup& group, SegmentRange range, TieGeometry shape, std::size_t) {
+      follow(group, range, shape, vl, wl, vs_.data(), ws_.data());
+    });
+    eachGroup([&](const TieGroup& group, SegmentRange range, TieGeometry shape, std::size_t) {
+      follow(group, range, shape, du, dturn, c.us.data(), c.turns.data());
+      if (shapeChange) followChange(group, shape, shapeChange, vl, c.us.data(), c.turns.data());
+    });
+    const auto changeOf = [&](const SpringEnd& end) {
+      EndMotion m;
+      if (end.node >= 0) {
+        if (dx) m.x = at(dx, end.node);
+        m.v = at(du, end.node);
+        if (end.node < model.rotating()) m.w = at(dturn, end.node);
+      } else if (end.slave >= 0) {
+        m.x = at(c.xs.data(), end.slave);
+        m.v = at(c.us.data(), end.slave);
+        if (end.slave < model.turning()) m.w = at(c.turns.data(), end.slave);
+      }
+      return m;
+    };
+    for (const Spring& spring : model.springs) {
+      const SpringLoad l = springChange(spring, motion(spring.a, spring, vl, wl), motion(spring.b, spring, vl, wl),
+                                        changeOf(spring.a), changeOf(spring.b));
+      addTo(spring.a, l.fa, l.ta, c.node.data(), c.nodeMoment.data(), c.load.data(), c.moment.data());
+      addTo(spring.b, l.fb, l.tb, c.node.data(), c.nodeMoment.data(), c.load.data(), c.moment.data());
+      strain += l.energy;
+    }
+  }
+
+  // T^T f_s
+  const auto spread = [&](const double* force, const double* moment, const double* value, const double* valueMoment) {
+    distributeLoads(force, moment, c.f.data(), c.t.data());
+    if (shapeChange)
+      eachGroup([&](const TieGroup& group, SegmentRange, TieGeometry shape, std::size_t) {
+        distributeChange(group, shape, shapeChange, value, valueMoment, c.f.data());
+      });
+  };
+  const auto inertial = [&](std::vector<double>& force, std::vector<double>& moment) {
+    for (int s = 0; s < model.slaves(); ++s) at(force.data(), s) *= -mass[s];
+    for (int s = 0; s < model.turning(); ++s) at(moment.data(), s) *= -inertia[s];
+  };
+  std::fill(c.f.begin(), c.f.end(), 0.0);
+  std::fill(c.t.begin(), c.t.end(), 0.0);
+  spread(c.load.data(), c.moment.data(), slaveLoad_, slaveMoment_);
+
+  // Accelerations: seeds where driven, the equation of motion where free.
+  double *da = a ? seed(Field::acceleration) : nullptr, *dz = seed(Field::angularAcceleration);
+  if (model.anyFree()) {
+    std::fill(da + first, da + last, 0.0);
+    std::fill(dz + first, dz + turning, 0.0);
+    if (consistent) {
+      const double *vp = velocityFor(Field::predicted), *wp = spinFor(Field::predicted);
+      slaveAccelerations(a, z, vp, wp);
+      inertialLoads();
+      changeAccelerations(c, da, dz, a, vp, wp, du, dturn, shapeChange);
+      inertial(c.as, c.zs);
+      const std::vector<double> f = c.f, t = c.t;
+      spread(c.as.data(), c.zs.data(), as_.data(), zs_.data());
+      for (int k = first; k < last; ++k) c.f[k] += c.node[k];
+      for (int k = first; k < turning; ++k) c.t[k] += c.nodeMoment[k];
+      inertia_->solve(c.f.data() + first, c.t.data() + first, da + first, dz + first);
+      c.f = f;
+      c.t = t;
+    } else {
+      const double *addedMass = field(Field::addedMass), *addedInertia = field(Field::addedInertia);
+      for (int i = model.freeBegin(); i < model.freeEnd(); ++i)
+        at(da, i) = (at(c.node.data(), i) + at(c.f.data(), i)) / (model.nodeMass[i] + addedMass[i]);
+      for (int i = model.freeBegin(); i < model.rotating(); ++i)
+        at(dz, i) = (at(c.nodeMoment.data(), i) + at(c.t.data(), i)) / (model.nodeInertia[i] + addedInertia[i]);
+    }
+  }
+
+  // Outputs
+  double *vs = seed(Field::slaveVelocity), *ws = seed(Field::slaveSpin);
+  eachGroup([&](const TieGroup& group, SegmentRange range, TieGeometry shape, std::size_t) {
+    follow(group, range, shape, du, dturn, vs, ws);
+    if (shapeChange) followChange(group, shape, shapeChange, v, vs, ws);
+  });
+  const bool full = model.settings.reaction != Reaction::loads, split = model.settings.reaction == Reaction::split;
+  if ((full && consistent) || has(Field::slaveAcceleration)) {
+    std::fill(c.as.begin(), c.as.end(), 0.0);
+    std::fill(c.zs.begin(), c.zs.end(), 0.0);
+    changeAccelerations(c, da, dz, a, v, w, du, dturn, shapeChange);
+    if (has(Field::slaveAcceleration)) std::copy(c.as.begin(), c.as.end(), seed(Field::slaveAcceleration));
+    if (full && consistent) {
+      slaveAccelerations(a, z, v, w);
+      inertialLoads();
+      inertial(c.as, c.zs);
+      spread(c.as.data(), c.zs.data(), as_.data(), zs_.data());
+    }
+  }
+  if (full && (!consistent || split)) {
+    const double sign = split ? 1 : -1;
+    for (int i = 0; i < model.nodes(); ++i) at(c.f.data(), i) += sign * field(Field::addedMass)[i] * at(da, i);
+    for (int i = 0; i < model.rotating(); ++i) at(c.t.data(), i) += sign * field(Field::addedInertia)[i] * at(dz, i);
+  }
+  std::copy(c.f.begin(), c.f.end(), seed(Field::reactionForce));
+  std::copy(c.t.begin(), c.t.end(), seed(Field::reactionMoment));
+  if (has(Field::energy)) {
+    double kinetic = 0;
+    for (int s = 0; s < model.slaves(); ++s)
+      kinetic += mass[s] * at(field(Field::slaveVelocity), s).dot(at(vs, s));
+    for (int s = 0; s < model.turning(); ++s)
+      kinetic += inertia[s] * at(field(Field::slaveSpin), s).dot(at(ws, s));
+    double* e = seed(Field::energy);
+    e[0] = kinetic;
+    e[1] = strain;
+    e[2] = e[3] = 0;
+    e[4] = kinetic + strain;
+  }
+  if (has(Field::powerResidual)) {
+    double sum = 0;
+    const auto change = [&](int count, const double* p, const double* q, const double* dp, const double* dq) {
+      double part = 0;
+      for (int i = 0; i < count; ++i) part += at(dp, i).dot(at(q, i)) + at(p, i).dot(at(dq, i));
+      return part;
+    };
+    sum += change(model.slaves(), slaveLoad_, field(Field::slaveVelocity), c.load.data(), vs);
+    sum += change(model.turning(), slaveMoment_, field(Field::slaveSpin), c.moment.data(), ws);
+    sum -= change(model.nodes(), field(Field::reactionForce), v, c.f.data(), du);
+    sum -= change(model.rotating(), field(Field::reactionMoment), w, c.t.data(), dturn);
+    *seed(Field::powerResidual) = sum;
+  }
+}
+
+}  // namespace tiefmu
