@@ -12,7 +12,7 @@ namespace tiefmu {
 namespace {
 
 constexpr int maxVectors = 32, maxRestarts = 40;
-constexpr double tolerance = 1e-10;
+constexpr double tolerance = 1e-9;
 constexpr double none = 1e30;
 
 // Spectral radius of one step of size h on x'' = -omega^2 x - c x'.
@@ -135,15 +135,18 @@ Spectrum::Value Spectrum::lanczos(bool damping, double* mode, int vectors) {
     apply(v(j).data(), p.data(), damping);
     solve(p.data(), x.data());
     tridiagonal(j, j) = v(j).dot(p);
-    for (int sweep = 0; sweep < 2; ++sweep)  // full reorthogonalisation
+    // Full reorthogonalisation; in the second sweep on an x made anew of p, as cancellation has parted the two.
+    for (int sweep = 0; sweep < 2; ++sweep) {
       for (int i = 0; i <= j; ++i) {
-        const double c = mv(i).dot(x);
+        const double c = v(i).dot(p);
         x -= c * v(i);
         p -= c * mv(i);
       }
+      solve(p.data(), x.data());
+    }
     beta = std::sqrt(std::max(0.0, x.dot(p)));
     const double scale = tridiagonal.diagonal().head(used).cwiseAbs().maxCoeff();
-    if (!(beta > 1e-11 * scale)) break;  // the space is exhausted: what is left is rounding
+    if (!(beta > tolerance * scale)) break;  // the space is exhausted: what is left is rounding
     if (used < vectors) tridiagonal(j, j + 1) = tridiagonal(j + 1, j) = beta;
     x /= beta;
     p /= beta;
