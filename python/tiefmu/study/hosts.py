@@ -1,0 +1,300 @@
+"""A host that moves the driven masters of a tie, in NumPy: point masses on ground springs, with rotary inertia.
+
+Between two communication points, H apart, the host integrates its own equations exactly under the tie's last known load
+(held, or extrapolated through the last two or three loads), so that what is left is the error of the coupling alone.
+Freedoms are the masters' translations, three each, then the rotations of those that turn; a state is an array of
+(rows, freedoms): displacement, velocity, acceleration, then what the extrapolation remembers.
+"""
+
+import ctypes
+import tempfile
+from dataclasses import dataclass
+
+import numpy as np
+
+from .. import package
+from .._core import SceneError
+from ..scene import Scene
+
+EXTRAPOLATIONS = ["held", "linear", "quadratic"]  # by order
+
+
+class Names:
+    """FMU names of what the host sets and reads; masters in the order of their numbers."""
+
+    def __init__(self, scene: Scene):
+        found = {}
+        for block in scene.start.variables:
+            found.setdefault((block["name"], block["causality"]), []).extend(block["numbers"].tolist())
+        self.driven = sorted(found.get(("master.v", "input"), []))
+        self.turning = sorted(found.get(("master.w", "input"), []))
+        if not self.driven:
+            raise SceneError(f"{scene.file}: no tied master is driven, so there is nothing for a host to move")
+        answering = found.get(("master.t", "output"), [])
+
+        def vectors(quantity, translations, rotations=()):
+            return [f"master[{i}].{q}[{k}]" for q, numbers in ((quantity[0], translations), (quantity[1], rotations))
+                    for i in numbers for k in (1, 2, 3)]
+        accelerated = ("master.a", "input") in found
+        self.velocity = vectors("vw", self.driven, self.turning)
+        self.acceleration = vectors("az", self.driven, self.turning) if accelerated else []
+        self.position = vectors("r-", self.driven) if ("master.r", "input") in found else []
+        self.inputs = self.velocity + self.acceleration + self.position
+        self.load = vectors("ft", self.driven, [i for i in self.turning if i in answering])
+        # freedom of each entry of `load`: a turning node without a moment output gets none
+        self.loaded = np.array([k for k in range(3 * len(self.driven))] +
+                               [3 * len(self.driven) + 3 * n + k for n, i in enumerate(self.turning)
+                                if i in answering for k in range(3)])
+        self.slaves = sorted(found[("slave.v", "output")])
+        self.slave_velocity = [f"slave[{j}].v[{k}]" for j in self.slaves for k in (1, 2, 3)]
+        self.slave_force = [f"slave[{j}].f[{k}]" for j in self.slaves for k in (1, 2, 3)]
+        self.freedoms = len(self.velocity)
+
+
+class Tie:
+    """The tie as its host sees it: loads from motions. `start`: positions of the driven masters, flat, m; `own`, `added`:
+    the masters' own and the lumped inertia per freedom (kg, kg m2)."""
+
+    def __init__(self, scene: Scene):
+        self.names = Names(scene)
+        nodes = scene.model.report()["nodes"]
+        master = nodes["master"].astype(bool)
+        row = {int(number): i for i, number in enumerate(nodes["number"]) if master[i]}
+        driven, turning = [row[i] for i in self.names.driven], [row[i] for i in self.names.turning]
+        self.start = nodes["position"][driven].ravel()
+        self.own = np.repeat(np.concatenate([nodes["mass"][driven], nodes["inertia"][turning]]), 3)
+        self.node_ids = nodes["id"][driven]
+        added_mass, added_inertia = scene.start.get("added_mass"), np.zeros(len(nodes["id"]))
+        if "added_inertia" in scene.start.fields:
+            added_inertia[:nodes["rotating"]] = scene.start.get("added_inertia")
+        self.added = np.repeat(np.concatenate([added_mass[driven], added_inertia[turning]]), 3)
+        self.accelerated, self.positioned = bool(self.names.acceleration), bool(self.names.position)
+        self.inputs = np.zeros(len(self.names.inputs))
+
+    def move(self, displacement, velocity, acceleration) -> np.ndarray:
+        """Sets the masters' motion (freedoms,); returns the loads that the tie answers with (freedoms,), N and N m."""
+        n = len(velocity)
+        self.inputs[:n] = velocity
+        if self.accelerated:
+            self.inputs[n:2 * n] = acceleration
+        if self.positioned:
+            self.inputs[-len(self.start):] = self.start + displacement[:len(self.start)]
+        load = np.zeros(n)
+        load[self.names.loaded] = self.answer()
+        return load
+
+
+class InProcess(Tie):
+    """By the solver in this process."""
+
+    def __init__(self, scene: Scene):
+        super().__init__(scene)
+        self.simulation = scene.simulation()
+        self.simulation.initialise(0.0)
+
+    def answer(self):
+        self.simulation.set_values(self.names.inputs, self.inputs)
+        return self.simulation.get_values(self.names.load)
+
+    def push(self, forces):
+        self.simulation.set_values(self.names.slave_force, forces)
+
+    def slave_velocity(self):
+        return self.simulation.get_values(self.names.slave_velocity)
+
+    def step(self, time, size):
+        self.simulation.step(size)
+
+
+class Packaged(Tie):
+    """By the packaged FMU under FMPy. Its calls take arrays made once, because FMPy's own conversions cost more than the
+    FMU does. Use as a context manager."""
+
+    def __init__(self, scene: Scene):
+        super().__init__(scene)
+        import fmpy  # here, because importing it takes half a second
+        import fmpy.fmi2
+
+        self.folder = tempfile.TemporaryDirectory(prefix="tiefmu-")
+        path = package.build(scene, f"{self.folder.name}/scene.fmu")
+        description = fmpy.read_model_description(str(path), validate=False)
+        fmpy.extract(str(path), self.folder.name)
+        self.fmu = fmpy.fmi2.FMU2Slave(guid=description.guid, unzipDirectory=self.folder.name, instanceName="tie",
+                                       modelIdentifier=description.coSimulation.modelIdentifier)
+        reference = {v.name: v.valueReference for v in description.modelVariables}
+
+        def block(names, values):
+            """Arguments of fmi2SetReal and fmi2GetReal after the instance."""
+            return ((ctypes.c_uint32 * len(names))(*(reference[n] for n in names)), len(names),
+                    values.ctypes.data_as(ctypes.POINTER(ctypes.c_double)))
+        self.loads = np.zeros(len(self.names.load))
+        self.forces, self.slave = np.zeros((2, len(self.names.slave_force)))
+        self.calls = {"inputs": block(self.names.inputs, self.inputs), "loads": block(self.names.load, self.loads),
+                      "forces": block(self.names.slave_force, self.forces),
+                      "slave": block(self.names.slave_velocity, self.slave)}
+        self.begin()
+
+    def begin(self):
+        self.fmu.instantiate()
+        self.restart(reset=False)
+
+    def restart(self, reset=True):
+        """Back to time 0."""
+        if reset:
+            self.fmu.reset()
+        self.fmu.setupExperiment(startTime=0.0)
+        self.fmu.enterInitializationMode()
+        self.fmu.exitInitializationMode()
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *reason):
+        self.fmu.freeInstance()
+        self.folder.cleanup()
+
+    def answer(self):
+        self.fmu.fmi2SetReal(self.fmu.component, *self.calls["inputs"])
+        self.fmu.fmi2GetReal(self.fmu.component, *self.calls["loads"])
+        return self.loads
+
+    def push(self, forces):
+        self.forces[:] = forces
+        self.fmu.fmi2SetReal(self.fmu.component, *self.calls["forces"])
+
+    def slave_velocity(self):
+        self.fmu.fmi2GetReal(self.fmu.component, *self.calls["slave"])
+        return self.slave.copy()
+
+    def step(self, time, size):
+        self.fmu.doStep(currentCommunicationPoint=time, communicationStepSize=size)
+
+
+def exponential(matrix: np.ndarray) -> np.ndarray:
+    """exp of small matrices (..., n, n): Taylor series of the matrix over 2^s, squared s times."""
+    squarings = max(0, int(np.ceil(np.log2(max(np.abs(matrix).sum(axis=-1).max(), 1e-300)))) + 3)
+    small, result = matrix / 2.0**squarings, np.eye(matrix.shape[-1])
+    term = result
+    for k in range(1, 18):
+        term = term @ small / k
+        result = result + term
+    for _ in range(squarings):
+        result = result @ result
+    return result
+
+
+@dataclass
+class Masses:
+    """What the host carries, per freedom: (M + D) u'' + damping u' + stiffness u = load. kg, N s/m, N/m, or the same of
+    rotations."""
+    mass: np.ndarray
+    stiffness: np.ndarray
+    damping: np.ndarray
+
+    def propagator(self, step: float) -> np.ndarray:
+        """(2, 5, freedoms): u and H u' after the step, from u, H u' and the coefficients of the acceleration H^2 load/mass
+        as a polynomial of degree two in (time / H)."""
+        kinds, which = np.unique(np.column_stack([step**2 * self.stiffness, step * self.damping])
+                                 / self.mass[:, None], axis=0, return_inverse=True)
+        generator = np.zeros((len(kinds), 5, 5))
+        generator[:, 0, 1] = generator[:, 1, 2] = 1     # u' = H u', (H u')' = ... + q(s)
+        generator[:, 1, :2] = -kinds
+        generator[:, 2, 3], generator[:, 3, 4] = 1, 2   # q0 + q1 s + q2 s^2, its derivatives at the running s
+        return np.moveaxis(exponential(generator)[which.ravel()][:, :2], 0, -1)
+
+
+class Coupling:
+    """Host and tie in turns, each H long: the tie answers the host's motion, the host moves on with that answer.
+
+    order: 0 load held, 1 linear, 2 quadratic extrapolation. differenced: the acceleration that the tie gets is the second
+    order backward difference (BDF2) of the velocities in place of the host's own. host: with the inertia that the tie's
+    `reaction` asks the host to carry.
+    """
+
+    def __init__(self, tie: Tie, host: Masses, step: float, order: int = 0, differenced: bool = False):
+        self.tie, self.host, self.size, self.order, self.differenced = tie, host, step, order, differenced
+        self.shift = host.propagator(step)
+        self.rows = 5 if differenced else 3 + order
+
+    def rest(self) -> np.ndarray:
+        return np.zeros((self.rows, len(self.host.mass)))
+
+    def load(self, state: np.ndarray) -> np.ndarray:
+        """What the tie answers at this state."""
+        u, v, a = state[:3]
+        if self.differenced:
+            a = (3 * v - 4 * state[3] + state[4]) / (2 * self.size)
+        return self.tie.move(u, v, a)
+
+    def advance(self, state: np.ndarray, load: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The state H later, and the extrapolated load there."""
+        u, v = state[0], state[1]
+        scale = self.size**2 / self.host.mass
+        s = self.shift
+        end, once, twice = load, 0.0, 0.0
+        if self.order == 1:
+            once = load - state[3]
+        elif self.order == 2:
+            once = 1.5 * load - 2 * state[3] + 0.5 * state[4]
+            twice = 0.5 * (load + state[4]) - state[3]
+        following = np.empty_like(state)
+        hv, q = self.size * v, scale * load
+        following[0] = s[0, 0] * u + s[0, 1] * hv + s[0, 2] * q
+        following[1] = s[1, 0] * u + s[1, 1] * hv + s[1, 2] * q
+        if self.order:
+            end = load + once + twice
+            following[:2] += s[:, 3] * (scale * once) + s[:, 4] * (scale * twice)
+        following[1] /= self.size
+        following[2] = (end - self.host.stiffness * following[0] - self.host.damping * following[1]) / self.host.mass
+        if self.differenced:
+            following[3], following[4] = v, state[3]
+        elif self.order:
+            following[3] = load
+            if self.order == 2:
+                following[4] = state[3]
+        return following, end
+
+    def matrix(self) -> np.ndarray:
+        """The one-step map of small motions about rest, column by column through the tie's own answers; it is the whole
+        map where the tie keeps no state of its own (small geometry, positions as inputs, no free node)."""
+        rest = self.rest()
+        still = self.load(rest)
+        columns = []
+        for k in range(rest.size):
+            state = rest.copy()
+            state.flat[k] = 1.0
+            columns.append(self.advance(state, self.load(state) - still)[0].ravel())
+        return np.array(columns).T
+
+    def radius(self) -> float:
+        """Spectral radius of the one-step map. Freedoms without springs drift, which is no growth: their displacement is
+        left out."""
+        matrix, n = self.matrix(), len(self.host.mass)
+        drifting = np.flatnonzero(np.abs(matrix[n:, :n]).max(axis=0) == 0)
+        kept = np.setdiff1d(np.arange(len(matrix)), drifting)
+        matrix = matrix[np.ix_(kept, kept)]
+        weight = np.repeat(self.units(), n)[kept]
+        return float(np.abs(np.linalg.eigvals(matrix * weight[:, None] / weight)).max())
+
+    def growth(self, steps: int, seed: int = 1) -> float:
+        """Measured growth of the accelerations per step, from the second to the last quarter of a run from a random state;
+        infinite where they overflow, 0 where they vanish. A run ends early where only rounding is left."""
+        rng = np.random.default_rng(seed)
+        state = rng.normal(size=(self.rows, len(self.host.mass))) / self.units()[:, None]
+        still = self.load(self.rest())
+        peaks = np.zeros(4)
+        for k in range(steps):
+            state = self.advance(state, self.load(state) - still)[0]
+            size = np.abs(state[2]).max()
+            if not size < 1e200:
+                return float(np.inf)
+            first = size if k == 0 else first
+            if size <= 1e-9 * first:
+                return float((size / first) ** (1 / k)) if first > 0 else 0.0
+            peaks[4 * k // steps] = max(peaks[4 * k // steps], size)
+        return float((peaks[3] / peaks[1]) ** (2 / steps)) if peaks[1] > 0 else 0.0
+
+    def units(self) -> np.ndarray:
+        """What turns each row of a state into a displacement: 1, H, H^2, then H^2 / mass or H."""
+        memory = [self.size] * 2 if self.differenced else [self.size**2 / np.mean(self.host.mass)] * self.order
+        return np.array([1, self.size, self.size**2, *memory])
