@@ -28,7 +28,10 @@ struct Simulation::Impl {
   Dynamics dynamics;
   Integrator integrator;
   Spectrum spectrum;
-  std::vector<double> backup;  // of what a step changes and cannot compute anew: the fields velocity .. bounds
+  // What a step changes and cannot compute anew: the fields velocity .. bounds, without offsets where they follow from
+  // the segments' rotations.
+  std::vector<double> backup;
+  Slice kept[2];
   double time = 0;
   std::int64_t substeps = 0;
   std::uint32_t flags = 0;
@@ -44,7 +47,15 @@ struct Simulation::Impl {
     energy = layout[Field::energy].count > 0;
     for (Field f : {Field::position, Field::segmentRotation, Field::orientation, Field::angle})
       integrates |= layout[f].count > 0;
-    if (model->anyFree()) backup.resize(layout[Field::slaveVelocity].offset - layout[Field::velocity].offset);
+    if (model->anyFree()) {
+      const bool own = std::any_of(model->groups.begin(), model->groups.end(),
+                                   [](const TieGroup& g) { return g.coupling == Coupling::rotation; });
+      const std::size_t first = layout[Field::velocity].offset, last = layout[Field::slaveVelocity].offset;
+      const std::size_t split = layout[Field::offset].offset, resume = split + (own ? 0 : layout[Field::offset].count);
+      kept[0] = {first, split - first};
+      kept[1] = {resume, last - resume};
+      backup.resize(kept[0].count + kept[1].count);
+    }
     for (int s = 0; s < 3 * model->turning(); ++s) integrates |= model->finite() && model->slaveOffset[s] != 0;
   }
 
@@ -251,15 +262,16 @@ void Simulation::step(double duration) {
     s.loadsOld = s.outputsOld = true;
     return;
   }
-  double* const state = s.field(Field::velocity);
-  std::copy_n(state, s.backup.size(), s.backup.begin());
+  std::copy_n(s.data.begin() + s.kept[0].offset, s.kept[0].count, s.backup.begin());
+  std::copy_n(s.data.begin() + s.kept[1].offset, s.kept[1].count, s.backup.begin() + s.kept[0].count);
   const double time = s.time;
   const std::int64_t substeps = s.substeps;
   s.outputsOld = true;
   try {
     s.integrate(duration);
   } catch (...) {
-    std::copy(s.backup.begin(), s.backup.end(), state);
+    std::copy_n(s.backup.begin(), s.kept[0].count, s.data.begin() + s.kept[0].offset);
+    std::copy_n(s.backup.begin() + s.kept[0].count, s.kept[1].count, s.data.begin() + s.kept[1].offset);
     s.time = time;
     s.substeps = substeps;
     s.flags &= ~accelerationsValid;
