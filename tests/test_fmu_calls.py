@@ -55,6 +55,11 @@ COMMON = ["GetTypesPlatform", "GetVersion", "SetDebugLogging", "Instantiate", "F
 CO_SIMULATION = ["SetRealInputDerivatives", "GetRealOutputDerivatives", "DoStep", "CancelStep", "GetStatus",
                  "GetRealStatus", "GetIntegerStatus", "GetBooleanStatus", "GetStringStatus"]
 
+# Refused, but there: some importers look up every function of the standard.
+MODEL_EXCHANGE = ["EnterEventMode", "NewDiscreteStates", "EnterContinuousTimeMode", "CompletedIntegratorStep", "SetTime",
+                  "SetContinuousStates", "GetDerivatives", "GetEventIndicators", "GetContinuousStates",
+                  "GetNominalsOfContinuousStates"]
+
 
 def elf_exports(data: bytes) -> set[str]:
     """Defined symbols of an ELF64 file's dynamic symbol table."""
@@ -71,13 +76,12 @@ def elf_exports(data: bytes) -> set[str]:
 
 
 def test_the_library_shows_the_functions_of_the_standard_and_nothing_else(fmu):
-    expected = {"fmi2" + name for name in COMMON + CO_SIMULATION}
+    expected = {"fmi2" + name for name in COMMON + CO_SIMULATION + MODEL_EXCHANGE}
     data = fmu.binary.read_bytes()
     if data[:4] == b"\x7fELF":
         assert elf_exports(data) == expected
     for name in expected:
         assert hasattr(fmu.library, name)
-    assert not hasattr(fmu.library, "fmi2GetDerivatives")
 
 
 def test_version_and_platform(fmu):
@@ -157,10 +161,19 @@ def test_calls_are_allowed_where_the_standard_says(loose, state):
 
 
 def test_no_instance_is_an_error_without_a_crash(fmu):
-    for name in COMMON + CO_SIMULATION:
+    for name in COMMON + CO_SIMULATION + MODEL_EXCHANGE:
         if name not in ("GetTypesPlatform", "GetVersion", "Instantiate", "FreeInstance"):
             assert getattr(fmu.library, "fmi2" + name)(None, *[None] * 7) == ERROR
     fmu.library.fmi2FreeInstance(None)
+
+
+@pytest.mark.parametrize("name", MODEL_EXCHANGE)
+def test_model_exchange_calls_are_refused_and_change_nothing(fmu, name):
+    instance = Instance(fmu).start()
+    assert instance.call(name, *([c_double(1.0)] if name == "SetTime" else [None] * 3)) == ERROR
+    assert instance.errors() == [f"fmi2{name}: only co-simulation is supported"]
+    assert instance.step(0, 0.01) == OK
+    instance.free()
 
 
 def test_what_is_not_built_is_refused_with_a_message(fmu):
