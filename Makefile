@@ -7,11 +7,14 @@ BIN := $(VENV)/bin
 REQUIRES = $(shell sed -n 's/^requires = \[\(.*\)\]/\1/p' pyproject.toml | sed 's/", /" /g')
 SOURCES := CMakeLists.txt $(wildcard src/*.?pp modelDescription/*.?pp fmu/*.?pp python/bindings/*.?pp)
 
-.PHONY: demo test bench clean
+# Other people's tools that the tests run FMUs in, each set in an environment of its own.
+TOOLS := build/tools/importers/installed build/tools/cofmupy/installed
+
+.PHONY: demo test tools bench clean
 demo: $(VENV)/installed
 	$(BIN)/tiefmu demo --out out
 
-test: $(VENV)/installed
+test: $(VENV)/installed tools
 	$(BIN)/python -m pytest -n 2
 
 bench: $(VENV)/installed
@@ -25,6 +28,18 @@ $(VENV)/built-with: pyproject.toml
 
 $(VENV)/installed: $(VENV)/built-with $(SOURCES)
 	$(BIN)/python -m pip install --quiet --no-build-isolation --editable '.[test]'
+	touch $@
+
+tools: $(TOOLS)
+
+build/tools/importers/installed: tests/tools/requirements.txt
+	$(PYTHON) -m venv --clear $(@D)
+	$(@D)/bin/python -m pip install --quiet -r $<
+	touch $@
+
+build/tools/cofmupy/installed: tests/tools/requirements-cofmupy.txt
+	$(PYTHON) -m venv --clear $(@D)
+	$(@D)/bin/python -m pip install --quiet --no-deps -r $<
 	touch $@
 
 clean:
