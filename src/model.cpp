@@ -36,6 +36,9 @@ class Compiler {
     model.settings = scene.settings;
     if (scene.settings.inertia == Inertia::lumped && scene.settings.reaction == Reaction::split)
       throw SceneError("model: reaction: 'split' needs inertia = 'consistent' (with lumped inertia it equals 'loads')");
+    if (scene.settings.safety > 1)
+      warn("integrator: safety = " + text(scene.settings.safety) +
+           " lets steps be longer than the stability limit: expect the solution to diverge");
     claimSlaves();
     for (int t = 0; t < static_cast<int>(scene.ties.size()); ++t) bind(t);
     chooseCouplings();

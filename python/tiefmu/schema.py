@@ -196,7 +196,7 @@ class Model(Table):
 class Integrator(Table):
     method: Literal["central-difference", "symplectic-euler", "noh-bathe", "rk4"] = "central-difference"
     time_step: NotNegative = 0.0
-    safety: Annotated[Positive, Field(le=1)] = 0.9
+    safety: Positive = 0.9
 
 
 class Interface(Table):
