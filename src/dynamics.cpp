@@ -335,6 +335,16 @@ void Dynamics::takeDrivenVelocities() {
   }
 }
 
+void Dynamics::inputsOver(double tau, double h) {
+  if (inputs.active()) inputs.over(tau, h, data);
+}
+
+void Dynamics::inputsAt(double tau) {
+  if (!inputs.active()) return;
+  inputs.at(tau, data);
+  if (!drivenMove_) updateGeometry();
+}
+
 void Dynamics::kick(double h) {
   const double *a = field(Field::acceleration), *z = field(Field::angularAcceleration);
   double *v = field(Field::velocity), *w = field(Field::spin);

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "inertia.hpp"
+#include "input_curve.hpp"
 #include "layout.hpp"
 #include "spring.hpp"
 #include "tie.hpp"
@@ -43,6 +44,10 @@ class Dynamics {
   void drift(double h, double ahead);
   // d/dt of the fields velocity .. work at the present state, for a Runge-Kutta stage. `rates` starts at velocity.
   void rates(double* rates);
+  // Inputs that move inside the step; no-ops where none does. Before a drift their mean over it, after it their end.
+  InputCurve inputs;
+  void inputsOver(double tau, double h);
+  void inputsAt(double tau);
   void normalise();  // offsets and rotations back to their length after a Runge-Kutta step
 
   // Outputs at the present state. `evaluate` (or evaluateReactions) must be up to date.

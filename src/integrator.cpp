@@ -15,33 +15,41 @@ Integrator::Integrator(Dynamics& dynamics) : dynamics_(dynamics) {
     earlier_.resize(layout[Field::acceleration].count + layout[Field::angularAcceleration].count);
 }
 
-bool Integrator::step(double h) {
+bool Integrator::step(double tau, double h) {
   Dynamics& d = dynamics_;
   switch (d.model.settings.method) {
     case Method::centralDifference:
       // Half kick, drift, half kick. Dampers see the half-step velocity; the bias, which is quadratic in it, sees it
       // extrapolated to the end of the step, without which the order would drop to one.
       d.kick(0.5 * h);
+      d.inputsOver(tau, h);
       d.drift(h, 0);
+      d.inputsAt(tau + h);
       d.setForceVelocities(0.5 * h, false);
       d.evaluate();
       d.kick(0.5 * h);
       return true;
     case Method::symplecticEuler:
       d.kick(h);
+      d.inputsOver(tau, h);
       d.drift(h, 0);
+      d.inputsAt(tau + h);
       d.setForceVelocities(0, true);
       return false;
     case Method::nohBathe: {
       const double h1 = nohBathe::p * h, h2 = (1 - nohBathe::p) * h;
       double* a = d.field(Field::acceleration);  // angular accelerations follow
+      d.inputsOver(tau, h1);
       d.drift(h1, 0.5 * h1);
+      d.inputsAt(tau + h1);
       d.setForceVelocities(h1, true);
       d.kick(0.5 * h1);
       std::copy_n(a, earlier_.size(), earlier_.begin());
       d.evaluate();
       d.kick(0.5 * h1);
+      d.inputsOver(tau + h1, h2);
       d.drift(h2, 0.5 * h2);
+      d.inputsAt(tau + h);
       d.setForceVelocities(h2, true);
       // v += h2 (q0 a_0 + (1/2 + q1) a_1 + q2 a_2)
       d.kick((0.5 + nohBathe::q1) * h2);
@@ -53,13 +61,13 @@ bool Integrator::step(double h) {
       return true;
     }
     case Method::rk4:
-      rungeKutta(h);
+      rungeKutta(tau, h);
       return false;
   }
   return false;
 }
 
-void Integrator::rungeKutta(double h) {
+void Integrator::rungeKutta(double tau, double h) {
   Dynamics& d = dynamics_;
   double* y = d.field(Field::velocity);
   const std::size_t size = start_.size();
@@ -68,6 +76,7 @@ void Integrator::rungeKutta(double h) {
   for (int stage = 0; stage < 4; ++stage) {
     if (stage > 0) {
       for (std::size_t k = 0; k < size; ++k) y[k] = start_[k] + ahead[stage - 1] * h * rates_[k];
+      d.inputsAt(tau + ahead[stage - 1] * h);
       d.updateGeometry();
       d.setForceVelocities(0, true);
       d.evaluate();
@@ -78,6 +87,7 @@ void Integrator::rungeKutta(double h) {
       for (std::size_t k = 0; k < size; ++k) sum_[k] += weight[stage] * rates_[k];
   }
   for (std::size_t k = 0; k < size; ++k) y[k] = start_[k] + h / 6 * sum_[k];
+  d.inputsAt(tau + h);
   d.normalise();
   d.updateGeometry();
   d.setForceVelocities(0, true);

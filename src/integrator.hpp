@@ -19,12 +19,12 @@ class Integrator {
  public:
   explicit Integrator(Dynamics& dynamics);
 
-  // From t to t + h. On entry the accelerations belong to the present state and inputs. Returns whether they do so
+  // From t to t + h; `tau` is the time since the inputs were set, s. On entry the accelerations belong to the present state and inputs. Returns whether they do so
   // again on exit (central difference, Noh-Bathe) or must be evaluated anew (symplectic Euler, RK4).
-  bool step(double h);
+  bool step(double tau, double h);
 
  private:
-  void rungeKutta(double h);
+  void rungeKutta(double tau, double h);
 
   Dynamics& dynamics_;
   std::vector<double> start_, rates_, sum_;  // of a Runge-Kutta step: the fields velocity .. work

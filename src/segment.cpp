@@ -99,7 +99,10 @@ Phi clamped(int n, const double* p) {
   std::copy_n(p, n, phi.begin());
   if (n == 4) {
     const double xi = p[1] + p[2] - p[0] - p[3], eta = p[2] + p[3] - p[0] - p[1];
-    if (std::abs(xi) <= 1 && std::abs(eta) <= 1) return phi;
+    if (std::abs(xi) <= 1 && std::abs(eta) <= 1) {
+      for (double& w : phi) w = std::max(w, 0.0);  // rounding on an edge
+      return phi;
+    }
     return shape(4, std::clamp(xi, -1.0, 1.0), std::clamp(eta, -1.0, 1.0));
   }
   double sum = 0;

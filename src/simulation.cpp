@@ -146,6 +146,7 @@ struct Simulation::Impl {
   void integrate(double duration) {
     const double end = time + duration;
     double left = duration;
+    dynamics.inputs.begin(data.data());
     evaluate();
     if (energy) startEnergy();
     Dynamics::Power before{};
@@ -167,7 +168,7 @@ struct Simulation::Impl {
           dynamics.evaluate();
           flags |= accelerationsValid;
         }
-        if (!integrator.step(h)) flags &= ~accelerationsValid;
+        if (!integrator.step(duration - left + static_cast<double>(done) * h, h)) flags &= ~accelerationsValid;
         ++done;
         ++substeps;
         if (energy) {
@@ -216,7 +217,37 @@ void Simulation::parametersChanged() {
   inputsChanged();
 }
 
+void Simulation::setInputDerivative(std::size_t place, int order, double value) {
+  impl_->dynamics.inputs.set(place, order, value, impl_->layout);
+}
+
+void Simulation::outputRates(double* rates) {
+  Impl& s = *impl_;
+  updateOutputs();
+  State before;
+  save(before);
+  const InputCurve inputs = s.dynamics.inputs;
+  const std::int64_t evaluations = s.dynamics.evaluations;
+  if (s.model->accelerationInputs())
+    for (const auto& [motion, rate] : {std::pair{Field::velocity, Field::acceleration},
+                                       std::pair{Field::spin, Field::angularAcceleration}})
+      for (std::size_t k = 0; k < s.layout[motion].count; ++k) {
+        const std::size_t node = k / 3;
+        if (static_cast<int>(node) >= s.model->freeBegin() && static_cast<int>(node) < s.model->freeEnd()) continue;
+        setInputDerivative(s.layout[motion].offset + k, 1, s.field(rate)[k]);
+      }
+  const double limit = s.model->anyFree() ? s.stepLimit() : none;
+  const double h = 1e-5 * std::min(limit, 1.0);
+  step(h);
+  updateOutputs();
+  for (std::size_t k = 0; k < s.layout.size; ++k) rates[k] = (s.data[k] - before.data[k]) / h;
+  restore(before);
+  s.dynamics.inputs = inputs;
+  s.dynamics.evaluations = evaluations;
+}
+
 void Simulation::reset() {
+  impl_->dynamics.inputs.clear();
   Impl& s = *impl_;
   s.dynamics.setStart();
   s.dynamics.evaluations = 0;
@@ -245,19 +276,25 @@ void Simulation::step(double duration) {
   Impl& s = *impl_;
   if (!s.model->anyFree()) {
     s.bringGeometry();
+    s.dynamics.inputs.begin(s.data.data());
     if (s.energy) {
       s.evaluate();
       s.startEnergy();
       const Dynamics::Power before = s.dynamics.power();
+      s.dynamics.inputsOver(0, duration);
       s.dynamics.drift(duration, 0);
+      s.dynamics.inputsAt(duration);
       s.dynamics.evaluateReactions();
       const Dynamics::Power after = s.dynamics.power();
       s.field(Field::work)[0] += 0.5 * duration * (before.external + after.external);
       s.field(Field::work)[1] += 0.5 * duration * (before.dissipated + after.dissipated);
       s.field(Field::work)[3] = s.totalEnergy();
-    } else if (s.integrates) {
-      s.dynamics.drift(duration, 0);
+    } else {
+      s.dynamics.inputsOver(0, duration);
+      if (s.integrates) s.dynamics.drift(duration, 0);
+      s.dynamics.inputsAt(duration);
     }
+    s.dynamics.inputs.clear();
     s.time += duration;
     s.loadsOld = s.outputsOld = true;
     return;
@@ -267,15 +304,24 @@ void Simulation::step(double duration) {
   const double time = s.time;
   const std::int64_t substeps = s.substeps;
   s.outputsOld = true;
-  try {
-    s.integrate(duration);
-  } catch (...) {
+  const auto undo = [&] {
+    s.dynamics.inputs.at(0, s.data.data());
+    s.dynamics.inputs.clear();
     std::copy_n(s.backup.begin(), s.kept[0].count, s.data.begin() + s.kept[0].offset);
     std::copy_n(s.backup.begin() + s.kept[0].count, s.kept[1].count, s.data.begin() + s.kept[1].offset);
     s.time = time;
     s.substeps = substeps;
     s.flags &= ~accelerationsValid;
     s.geometryOld = s.loadsOld = true;
+  };
+  try {
+    s.integrate(duration);
+    s.dynamics.inputs.clear();
+  } catch (const SceneError& e) {  // the mass matrix of a geometry that has blown up
+    undo();
+    throw Diverged("diverged after t = " + std::to_string(time) + " s: " + e.what());
+  } catch (...) {
+    undo();
     throw;
   }
 }

@@ -39,6 +39,12 @@ class Simulation {
   void reset();
   // Start time, s. Then inertia, limits and the first outputs are there. Throws SceneError (e.g. free node without mass).
   void initialise(double time);
+  // How an input at `place` of the array moves inside the next step: order 1 (its rate) or 2. Afterwards the input
+  // stands at the step's end.
+  void setInputDerivative(std::size_t place, int order, double value);
+  // Rate of change of every number of the array at the present state, by a short trial step with inputs moving as
+  // their known rates say (velocities by the accelerations given). `rates` is laid out like `data`. First order.
+  void outputRates(double* rates);
   // From time() to time() + duration (s, > 0, finite), in equal substeps of at most safety * limit. No allocation.
   // Throws Diverged.
   void step(double duration);
