@@ -29,7 +29,7 @@ class Limit:
 
     def tests(self) -> dict[str, Callable[[float], bool]]:
         """The ways to tell failing, by name."""
-        found = {"growth": self.fails} if self.fails else {}
+        found = {"run": self.fails} if self.fails else {}
         return found | ({"radius": lambda value: self.radius(value) > GROWS} if self.radius else {})
 
 

@@ -6,9 +6,9 @@ from dataclasses import asdict
 from pathlib import Path
 
 from . import page, stability_cases, stability_map
-from .limits import Limit, Value, edge
+from .limits import GROWS, Limit, Value, edge
 
-LIMIT_COLUMNS = ["item", "case", "parameter", "closed", "growth", "radius", "stated", "deviation", "status"]
+LIMIT_COLUMNS = ["item", "case", "parameter", "closed", "run", "radius", "stated", "deviation", "status"]
 VALUE_COLUMNS = ["item", "case", "parameter", "closed", "measured", "tolerance", "status"]
 BRACKET = 0.02  # how far a measured limit may lie from its closed form
 
@@ -62,7 +62,7 @@ def limit_row(limit: Limit) -> list:
     ways = [*measured.values()] + ([limit.stated] if limit.stated else [])
     off = max((abs(way / limit.closed - 1) for way in ways), default=math.nan)
     off = math.nan if any(map(math.isnan, ways)) else off
-    return [limit.item, limit.case, limit.parameter, float(limit.closed), measured.get("growth", math.nan),
+    return [limit.item, limit.case, limit.parameter, float(limit.closed), measured.get("run", math.nan),
             measured.get("radius", math.nan), limit.stated or math.nan, off, "ok" if off < BRACKET else "off"]
 
 
@@ -94,7 +94,7 @@ def show(limit_table: list, value_table: list, points: list):
 
 
 def agreeing(points: list) -> int:
-    return sum((p.growth > 1) != p.stable for p in points)
+    return sum((p.growth > GROWS) != p.stable for p in points)
 
 
 def draw(limit_table: list, folder: Path) -> Path:
@@ -107,7 +107,7 @@ def draw(limit_table: list, folder: Path) -> Path:
     figure, axis = plt.subplots(figsize=(10, 1.6 + 0.24 * len(rows)), layout="constrained")
     axis.axvspan(1 - BRACKET, 1 + BRACKET, color="#e8eef2", label="2 % bracket")
     for column, marker, colour in ((4, "o", "#1f5fa8"), (5, "x", "#b3402e"), (6, "|", "#222222")):
-        name = {4: "growth of a run", 5: "spectral radius of one step", 6: "stated by the program"}[column]
+        name = {4: "found by runs", 5: "spectral radius of one step", 6: "stated by the program"}[column]
         axis.plot([row[column] / row[3] for row in rows], range(len(rows)), marker, color=colour, label=name,
                   fillstyle="none", markersize=7)
     axis.set_yticks(range(len(rows)), [f"{row[0]}: {row[1]} ({row[2]})" for row in rows], fontsize=8)

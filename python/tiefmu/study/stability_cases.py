@@ -54,7 +54,7 @@ def split_limits() -> list[Limit]:
     for r in (10.0, 1000.0):
         def carrying(share, r=r):
             return coupled(plate(4 * r, "split"), "split", 0.1, share=share * (r - 1) / r)
-        found.append(Limit("2", f"split, r = {r:g}, host carries D' instead of D", "D' / (D - M), inverted", 1.0,
+        found.append(Limit("2", f"split, r = {r:g}, host carries D' instead of D", "(D - M) / D'", 1.0,
                            lambda x, c=carrying: c(1 / x).growth(400) > 1, lambda x, c=carrying: c(1 / x).radius()))
     for r, zeta in ((1.0, 0.02), (10.0, 0.05)):
         def sprung(step, r=r, zeta=zeta):

@@ -10,6 +10,7 @@ from .limits import GROWS, coupled, plate
 ZETA = 0.02  # of the host's masters on their springs
 MODES = [("loads", 0), ("full", 0), ("split", 0), ("split", 1)]  # reaction, order of the extrapolation
 CLASSES = [1e-3, 1e-2, 1e-1]  # upper ends of the classes of error; beyond the last one, and unstable
+MAX_STEPS = 6000  # of a run
 EVERY = 4  # how many grid lines lie between the points that are also decided by a run
 
 
@@ -41,8 +42,17 @@ def point(reaction: str, order: int, ratio: float, step: float, run: bool) -> Po
     for tied in (0.0, ratio):
         exact = (-ZETA + 1j * np.sqrt(1 + tied - ZETA**2)) / (1 + tied)
         error = max(error, float(np.abs(found - exact).min() / abs(exact)))
-    growth = coupling.growth(2000) if run else float("nan")
+    growth = grown(coupling, 2 * np.pi * np.sqrt(1 + ratio) / step) if run else float("nan")
     return Point(reaction, order, ratio, step, float(np.abs(roots).max()), growth, error)
+
+
+def grown(coupling, period: float) -> float:
+    """Growth per step over eight of the slowest periods (each so many steps); NaN where those are too many steps and the
+    run has not made itself plain before."""
+    wanted = int(np.ceil(8 * period))
+    steps = min(wanted, MAX_STEPS)
+    growth = coupling.growth(steps)
+    return growth if steps == wanted or growth ** (steps / 2) > 1e3 else float("nan")
 
 
 def axes(count: int) -> tuple[np.ndarray, np.ndarray]:
@@ -88,7 +98,7 @@ def draw(found: list[Point], folder: Path) -> Path:
                         vmax=4.5, shading="nearest", rasterized=True)
         for p in own:
             if p.growth == p.growth:
-                axis.plot(p.ratio, p.step, "x" if p.growth > 1 else "o", color="black", markersize=4, fillstyle="none",
+                axis.plot(p.ratio, p.step, "x" if p.growth > GROWS else "o", color="black", markersize=4, fillstyle="none",
                           markeredgewidth=0.9)
         if reaction == "full":
             axis.axvline(1.0, color="black", linestyle="--", linewidth=1.2)
