@@ -1,0 +1,206 @@
+"""A scene changed one choice at a time: inertia, geometry, formulation, freedoms, method, a penalty in place of the tie.
+
+Every change gives a scene of the ordinary kind, so that all of them run in the same compiled solver.
+"""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from .. import schema
+from .._core import SceneError
+from ..scene import MOTIONS, NODE_VALUES, Assembly, Scene, read_toml
+from ..units import Units
+
+METHODS = ["central-difference", "symplectic-euler", "noh-bathe", "rk4"]
+HEAVY = 1e18  # mass of a driven node made free, in units of what else there is: its motion is then what was given
+
+
+@dataclass(frozen=True)
+class Variant:
+    """One model of a scene. formulation: "scene" leaves the ties as they are; freedoms: "all", or "translations" for
+    masters without rotations; penalty: frequency of the slave on its penalty spring in units of the scene's highest,
+    0 for a tie."""
+    inertia: str = "consistent"
+    geometry: str = "finite"
+    formulation: str = "scene"
+    freedoms: str = "all"
+    penalty: float = 0.0
+
+    @property
+    def reference(self) -> "Variant":
+        """The model without model error that this one is compared with."""
+        return Variant(formulation=self.formulation)
+
+    @property
+    def name(self) -> str:
+        parts = [f"penalty x{self.penalty:g}" if self.penalty else self.inertia]
+        parts += ["small geometry"] if self.geometry == "small" else []
+        parts += ["no rotations"] if self.freedoms != "all" else []
+        return ", ".join(parts)
+
+
+class Source:
+    """A scene file as read, before it is compiled: `variant` and `Scene` come from it. Raises SceneError."""
+
+    def __init__(self, path):
+        self.file, self.name, self.folder = str(path), Path(path).stem, Path(path).parent
+        try:
+            self.tables = schema.parse(read_toml(Path(path)))
+        except SceneError as error:
+            raise SceneError(f"{self.file}: {error}") from None
+        self.scene = self.compile(self.tables)  # as it is: what is wrong with it shows here
+        self.gravity = Units(**self.tables.units.model_dump()).si("gravity", self.tables.model.gravity)
+        nodes = self.scene.model.report()["nodes"]
+        moving = {MOTIONS[m] for m in nodes["motion"].tolist()}
+        self.any_free, self.any_driven = "free" in moving, "driven" in moving
+        self.formulations = {tie.formulation for tie in self.tables.tie}
+
+    def compile(self, tables: schema.SceneTables) -> Scene:
+        """Raises SceneError with the file's name."""
+        try:
+            return Scene(self.file, self.name, tables.model_copy(deep=True), self.folder)
+        except SceneError as error:
+            raise SceneError(f"{self.file}: {error}") from None
+
+    def changed(self, variant: Variant) -> schema.SceneTables:
+        """The tables of a variant that is a tie."""
+        tables = self.tables.model_copy(deep=True)
+        tables.model.inertia, tables.model.geometry = variant.inertia, variant.geometry
+        if variant.formulation != "scene":
+            for tie in tables.tie:
+                tie.formulation = variant.formulation
+        if variant.freedoms == "translations":
+            self.drop_rotations(tables)
+        return tables
+
+    def drop_rotations(self, tables: schema.SceneTables):
+        """Nothing turns but the slaves of optimized ties; those of default ties lose their rotary inertia with it."""
+        assembly = Assembly(tables, self.folder)
+        default = [assembly.mesh.node_id[slaves].tolist() for tie, (_, _, slaves) in zip(tables.tie, assembly.ties)
+                   if tie.formulation == "default"]
+        for table in tables.node:
+            table.rotations = False if table.rotations else table.rotations
+        for slaves in default:
+            tables.node.append(schema.Node(nodes=slaves, inertia=0.0))
+        for table in tables.initial:
+            table.w = None
+        tables.initial = [table for table in tables.initial if table.v is not None]
+
+    def build(self, variant: Variant, method: str = "central-difference", reaction: str = "full",
+              energy: bool = False, heavy: bool = False) -> Scene:
+        """The variant, compiled.
+
+        energy: expose the energies. heavy: driven nodes become free ones too heavy for anything but their given
+        acceleration to move them. Raises SceneError.
+        """
+        tables = self.penalty(variant) if variant.penalty else self.changed(variant)
+        if heavy and self.any_driven:
+            tables = self.arrays(tables, heavy=True)
+        tables.model.reaction, tables.model.position = reaction, "integrated"
+        tables.integrator = schema.Integrator(method=method)
+        tables.interface = schema.Interface(expose=["energy"] if energy else [])
+        scene = self.compile(tables)
+        scene.gravity = self.gravity
+        return scene
+
+    def arrays(self, tables: schema.SceneTables, heavy: bool) -> schema.SceneTables:
+        """The same scene in SI with inline mesh and one node table a node, so that single nodes can be changed."""
+        a = Assembly(tables.model_copy(deep=True), self.folder)
+        ids, si = a.mesh.node_id, a.units.si
+        new = tables.model_copy(deep=True)
+        new.units = schema.Units()
+        new.mesh = schema.Mesh(
+            nodes=[(int(i), *map(float, x)) for i, x in zip(ids, a.position)],
+            segments=[[int(e), *(int(ids[n]) for n in corners if n >= 0)]
+                      for e, corners in zip(a.mesh.segment_id, a.mesh.segments)])
+        motion = [MOTIONS[m] for m in a.motion]
+        values = {key: a.values[key].copy() for key in NODE_VALUES}
+        slave = np.zeros(len(ids), bool)
+        for _, _, slaves in a.ties:
+            slave[slaves] = True
+        if heavy:
+            driven = ~slave & (a.motion == MOTIONS.index("driven"))
+            for key in ("mass", "inertia"):
+                values[key][driven] = HEAVY * max(1.0, a.values["mass"].max(), a.values["inertia"].max())
+            motion = ["free" if d else m for d, m in zip(driven, motion)]
+        motion = [None if s else m for s, m in zip(slave, motion)]  # a slave's motion is that of its tie
+        new.node = [schema.Node(nodes=[int(i)], motion=m, rotations=bool(r),
+                                **{key: float(v[k]) for key, v in values.items()})
+                    for k, (i, m, r) in enumerate(zip(ids, motion, a.rotations))]
+        new.initial = [schema.Initial(nodes=[int(i)], v=v.tolist(), w=w.tolist() if r else None)
+                       for i, v, w, r in zip(ids, a.velocity, a.spin, a.rotations) if v.any() or (r and w.any())]
+        for tie, (_, segments, slaves) in zip(new.tie, a.ties):
+            tie.segments, tie.slaves = a.mesh.segment_id[segments].tolist(), ids[slaves].tolist()
+            tie.search_distance = si("search_distance", tie.search_distance)
+        new.spring = []
+        for table, (first, second) in zip(tables.spring, a.springs):
+            for p, q in zip(first, second):
+                ends = {"ground": [int(ids[p])]} if q < 0 else {"nodes": [int(ids[p]), int(ids[q])]}
+                keys = ("stiffness", "damping") + (("rotational_stiffness", "rotational_damping")
+                                                   if table.kind == "bushing" else ())
+                vector = {key: np.asarray(si(key, getattr(table, key))).tolist() for key in keys}
+                new.spring.append(schema.Spring(**ends, kind=table.kind, **vector))
+        new.model.gravity = np.asarray(si("gravity", tables.model.gravity)).tolist()
+        return new
+
+    def penalty(self, variant: Variant) -> schema.SceneTables:
+        """Each slave becomes a free node, held by a stiff spring at the place where its tie would put it.
+
+        That place is a massless slave of the same tie, so that kinematics and loads are those of the tie itself. Every
+        slave needs mass. Raises SceneError.
+        """
+        base = replace(variant, penalty=0.0)
+        scene = self.compile(self.changed(base))
+        found = scene.model.report()
+        top = 2 / scene.start.get("stable_time_step")[0]
+        if not top > 1e-20:
+            raise SceneError(f"{self.file}: no free node is held by a spring, so a penalty has no frequency to be "
+                             "compared with")
+        new = self.arrays(self.changed(base), heavy=False)
+        tables = {table.nodes[0]: table for table in new.node}
+        slaves = dict(zip(found["slaves"]["id"].tolist(), range(len(found["slaves"]["id"]))))
+        turning = [found["couplings"][c] != "translation" for c in found["slaves"]["coupling"]]
+        ghost = {node: node + max(tables) for node in slaves}
+        v, w = scene.start.get("slave_velocity"), scene.start.get("slave_spin") if any(turning) else None
+        place = {row[0]: row[1:] for row in new.mesh.nodes}
+        for node, s in slaves.items():
+            table, turns = tables[node], turning[s] and tables[node].inertia > 0
+            if not table.mass > 0:
+                raise SceneError(f"{self.file}: node {node}: has no mass, so a penalty cannot tie it")
+            new.mesh.nodes.append((ghost[node], *place[node]))
+            k = table.mass * (variant.penalty * top) ** 2
+            new.node.append(schema.Node(nodes=[ghost[node]], motion="driven", rotations=table.rotations))
+            new.spring.append(schema.Spring(nodes=[node, ghost[node]], kind="bushing", stiffness=k,
+                                            rotational_stiffness=k * table.inertia / table.mass if turns else 0.0))
+            new.initial.append(schema.Initial(nodes=[node], v=v[s].tolist(), w=w[s].tolist() if turns else None))
+            table.motion, table.rotations = "free", turns
+        for tie in new.tie:
+            tie.slaves = [ghost[node] for node in tie.slaves if node in ghost]
+        return new
+
+
+def compiles(source: Source, variant: Variant) -> bool:
+    try:
+        source.build(variant, heavy=True)
+        return True
+    except SceneError:
+        return False
+
+
+def variants(source: Source) -> list[Variant]:
+    """Every tie that the scene allows and that is not the same as another one: the reference of each formulation
+    first."""
+    result = []
+    for formulation in ["scene", *sorted({"default", "optimized"} - (source.formulations
+                                                                     if len(source.formulations) == 1 else set()))]:
+        for geometry in ("finite", "small"):
+            for inertia in ("consistent", "lumped"):
+                variant = Variant(inertia, geometry, formulation)
+                if compiles(source, variant):
+                    result.append(variant)
+    dropped = Variant(freedoms="translations")
+    if len(source.scene.rotations) and compiles(source, dropped):
+        result.append(dropped)
+    return result
