@@ -1,12 +1,12 @@
 #include "instance.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
-#include <limits>
 
 #include "../modelDescription/xml.hpp"
 
@@ -57,10 +57,35 @@ std::string folderOf(const std::string& location) {
   return path;
 }
 
+// Adding the lowest exponent bit to an exponent of ones, which infinities and NaN have, carries into the sign bit.
 bool allFinite(const double* values, std::size_t count) {
-  bool finite = true;
-  for (std::size_t i = 0; i < count; ++i) finite &= std::abs(values[i]) <= std::numeric_limits<double>::max();
-  return finite;
+  constexpr std::uint64_t exponent = 0x7ff0000000000000, lowest = 0x0010000000000000;
+  std::uint64_t carry = 0;
+  for (std::size_t i = 0; i < count; ++i) carry |= (std::bit_cast<std::uint64_t>(values[i]) & exponent) + lowest;
+  return carry >> 63 == 0;
+}
+
+// How many of `count` references ascend by one from the first.
+std::size_t runLength(const fmi2ValueReference refs[], std::size_t count) {
+  constexpr std::size_t stride = 16;  // compared at once, without a branch each
+  const std::uint32_t first = refs[0];
+  std::size_t run = 1;
+  if (count == 1 || refs[1] != first + 1) return run;
+  while (run + stride <= count) {
+    std::uint32_t differs = 0;
+    for (std::size_t j = 0; j < stride; ++j) differs |= refs[run + j] ^ (first + static_cast<std::uint32_t>(run + j));
+    if (differs) break;
+    run += stride;
+  }
+  while (run < count && refs[run] == first + run) ++run;
+  return run;
+}
+
+void copy(const double* from, std::size_t count, double* to) {
+  if (count < 4)  // shorter than the call of memcpy
+    for (std::size_t i = 0; i < count; ++i) to[i] = from[i];
+  else
+    std::memcpy(to, from, count * sizeof(double));
 }
 
 std::string text(double number) {
@@ -198,8 +223,7 @@ void Instance::forRuns(const fmi2ValueReference refs[], std::size_t count, Use u
     const std::uint32_t first = refs[i];
     const Range& range = rangeOf(first);
     const std::size_t most = std::min<std::size_t>(count - i, range.end - first);
-    std::size_t run = 1;
-    while (run < most && refs[i + run] == first + run) ++run;
+    const std::size_t run = runLength(refs + i, most);
     use(range, first, run, i);
     i += run;
   }
@@ -207,39 +231,42 @@ void Instance::forRuns(const fmi2ValueReference refs[], std::size_t count, Use u
 
 void Instance::get(const fmi2ValueReference refs[], std::size_t count, double values[]) {
   if (count > 0 && !values) throw Refused("the array of values is a null pointer");
-  if (state == initializationMode || state == stepComplete) simulation.updateOutputs();
+  if (state != error) simulation.updateOutputs();
   const double* data = simulation.data();
   forRuns(refs, count, [&](const Range& range, std::uint32_t first, std::size_t run, std::size_t i) {
-    std::memcpy(values + i, data + range.place + (first - range.first), run * sizeof(double));
+    copy(data + range.place + (first - range.first), run, values + i);
   });
 }
 
-void Instance::checkSettable(const Range& range, std::uint32_t reference) const {
-  if (range.causality == Causality::input) return;
-  if (range.causality == Causality::parameter && state != stepComplete) return;
+void Instance::refuseToSet(const Range& range, std::uint32_t reference) const {
   const char* why = range.causality == Causality::parameter             ? "is fixed after the initialisation"
                     : range.causality == Causality::calculatedParameter ? "is calculated"
                                                                         : "is an output";
   throw Refused("variable '" + nameOf(reference) + "' " + why + " and cannot be set");
 }
 
+// `first` is the reference of values[0]; one of the values from there on is not finite.
+void Instance::refuseValue(std::uint32_t first, const double* values) const {
+  std::uint32_t bad = 0;
+  while (std::isfinite(values[bad])) ++bad;
+  throw Refused("variable '" + nameOf(first + bad) + "' cannot be set to " +
+                (std::isnan(values[bad]) ? "NaN" : "an infinite value"));
+}
+
 void Instance::set(const fmi2ValueReference refs[], std::size_t count, const double values[]) {
   if (count > 0 && !values) throw Refused("the array of values is a null pointer");
   bool parameters = false, inputs = false;
+  double* data = simulation.data();
+  runs.clear();
   // First all checks: a refused call changes nothing.
   forRuns(refs, count, [&](const Range& range, std::uint32_t first, std::size_t run, std::size_t i) {
-    checkSettable(range, first);
-    (range.causality == Causality::parameter ? parameters : inputs) = true;
-    if (allFinite(values + i, run)) return;
-    std::size_t bad = 0;
-    while (std::isfinite(values[i + bad])) ++bad;
-    throw Refused("variable '" + nameOf(first + static_cast<std::uint32_t>(bad)) + "' cannot be set to " +
-                  (std::isnan(values[i + bad]) ? "NaN" : "an infinite value"));
+    if (range.causality == Causality::input) inputs = true;
+    else if (range.causality == Causality::parameter && state != stepComplete) parameters = true;
+    else refuseToSet(range, first);
+    if (!allFinite(values + i, run)) refuseValue(first, values + i);
+    runs.push_back({values + i, data + range.place + (first - range.first), run});
   });
-  double* data = simulation.data();
-  forRuns(refs, count, [&](const Range& range, std::uint32_t first, std::size_t run, std::size_t i) {
-    std::memcpy(data + range.place + (first - range.first), values + i, run * sizeof(double));
-  });
+  for (const Run& run : runs) copy(run.from, run.count, run.to);
   if (parameters) simulation.parametersChanged();
   if (inputs) simulation.inputsChanged();
 }

@@ -73,6 +73,13 @@ class Instance {
     std::size_t place;
   };
 
+  // Values on their way to the array.
+  struct Run {
+    const double* from;
+    double* to;
+    std::size_t count;
+  };
+
   struct Clock {
     double time = 0, stop = 0;
     bool stopDefined = false;
@@ -85,7 +92,8 @@ class Instance {
   };
 
   const Range& rangeOf(std::uint32_t reference) const;
-  void checkSettable(const Range& range, std::uint32_t reference) const;
+  [[noreturn]] void refuseToSet(const Range& range, std::uint32_t reference) const;
+  [[noreturn]] void refuseValue(std::uint32_t first, const double* values) const;
   std::string nameOf(std::uint32_t reference) const;
   SavedState& known(fmi2FMUstate saved) const;
   // Calls use(range, first reference, number, index of the first) for each run of consecutive references.
@@ -96,6 +104,7 @@ class Instance {
   std::vector<Range> ranges;
   std::vector<std::uint32_t> firstRange;  // range of every 64th reference
   std::uint32_t references = 0;
+  std::vector<Run> runs;  // of the present fmi2SetReal
   Clock clock;
   std::unordered_map<fmi2FMUstate, std::unique_ptr<SavedState>> savedStates;
 };

@@ -30,7 +30,7 @@ class Fmu:
         self.path = tiefmu.build(tiefmu.load(scene), self.folder / "scene.fmu")
         with zipfile.ZipFile(self.path) as archive:
             archive.extractall(self.folder)
-        self.description = fmpy.read_model_description(str(self.path), validate=True, validate_variable_names=True,
+        self.description = fmpy.read_model_description(str(self.path), validate=True, validate_variable_names=False,
                                                        validate_model_structure=True)
         self.variables = {v.name: v for v in self.description.modelVariables}
         self.reference = {v.name: v.valueReference for v in self.description.modelVariables}

@@ -14,6 +14,7 @@ from test_fmu_dependencies import random_values
 from test_fmu_dependencies import scene as many_sided
 
 MIXED = ("default", True, "mixed", "consistent", "split", "finite", "integrated")
+DRIVEN = ("default", False, "driven", "lumped", "full", "small", "input")
 ALL_FREE = ("optimized", True, "free", "lumped", "loads", "finite", "integrated")
 
 
@@ -23,8 +24,7 @@ def fmu(tmp_path_factory):
     return Fmu(many_sided(np.random.default_rng(1), *MIXED), tmp_path_factory.mktemp("fmu"))
 
 
-@pytest.fixture(scope="module", params=[MIXED, ALL_FREE, ("default", False, "driven", "lumped", "full", "small", "input")],
-                ids=["mixed", "free", "driven"])
+@pytest.fixture(scope="module", params=[MIXED, ALL_FREE, DRIVEN], ids=["mixed", "free", "driven"])
 def any_fmu(request, tmp_path_factory):
     return Fmu(many_sided(np.random.default_rng(2), *request.param), tmp_path_factory.mktemp("fmu"))
 
@@ -280,7 +280,7 @@ def checksum(body: bytes) -> int:
 
 
 def test_damaged_resources_end_in_a_message(loose, tmp_path):
-    """Cut anywhere; any byte changed; and changed with the checksum put right, so that the reader itself must see it."""
+    """Cut anywhere; any byte changed; and changed with the checksum put right, so that the reader must see it."""
     good = (loose.folder / "resources" / "scene.bin").read_bytes()
     header = len(b"tiefmu scene\n") + 4 + 8 + 8
     rng = np.random.default_rng(7)
@@ -341,7 +341,20 @@ def test_outputs_follow_inputs_at_the_same_time(tmp_path, fmu):
     instance.free()
 
 
-@pytest.mark.parametrize("value, text", [(np.nan, "NaN"), (np.inf, "an infinite value"), (-np.inf, "an infinite value")])
+def test_the_last_outputs_can_be_read_after_termination(any_fmu):
+    read, unread = Instance(any_fmu).start(), Instance(any_fmu).start()
+    for instance in (read, unread):
+        assert instance.set(random_values(any_fmu, np.random.default_rng(21), any_fmu.names("input"))) == OK
+        assert instance.step(0, 0.02) == OK
+    expected = read.get(any_fmu.names("output"))
+    assert unread.call("Terminate") == OK
+    np.testing.assert_array_equal(unread.get(any_fmu.names("output")), expected)
+    read.free()
+    unread.free()
+
+
+@pytest.mark.parametrize("value, text", [(np.nan, "NaN"), (np.inf, "an infinite value"),
+                                         (-np.inf, "an infinite value")])
 def test_values_that_are_not_finite_change_nothing(fmu, value, text):
     instance = Instance(fmu).start(values={"slave[1].f[1]": 1.5})
     names = fmu.names("input")
