@@ -13,7 +13,7 @@ from lxml import etree
 
 import tiefmu
 from fmu_calls import OK, Fmu, Instance
-from test_fmu_dependencies import SETTINGS, scene as many_sided
+from fmu_scenes import SETTINGS, scene as many_sided
 
 SCENES = sorted((Path(__file__).parents[1] / "scenes").glob("*.toml"))
 
