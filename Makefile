@@ -7,7 +7,8 @@ BIN := $(VENV)/bin
 REQUIRES = $(shell sed -n 's/^requires = \[\(.*\)\]/\1/p' pyproject.toml | sed 's/", /" /g')
 SOURCES := CMakeLists.txt $(wildcard src/*.?pp modelDescription/*.?pp fmu/*.?pp python/bindings/*.?pp)
 
-# Other people's tools that the tests run FMUs in, each set in an environment of its own.
+# Other people's tools that the tests run FMUs in, each set in an environment of its own. Not compiled ahead: most of
+# their files are never imported.
 TOOLS := build/tools/importers/installed build/tools/cofmupy/installed
 
 .PHONY: demo test tools bench clean
@@ -34,12 +35,12 @@ tools: $(TOOLS)
 
 build/tools/importers/installed: tests/tools/requirements.txt
 	$(PYTHON) -m venv --clear $(@D)
-	$(@D)/bin/python -m pip install --quiet -r $<
+	$(@D)/bin/python -m pip install --quiet --no-compile -r $<
 	touch $@
 
 build/tools/cofmupy/installed: tests/tools/requirements-cofmupy.txt
 	$(PYTHON) -m venv --clear $(@D)
-	$(@D)/bin/python -m pip install --quiet --no-deps -r $<
+	$(@D)/bin/python -m pip install --quiet --no-compile --no-deps -r $<
 	touch $@
 
 clean:

@@ -5,7 +5,6 @@ A case is what tests/tools/runner.py reads: FMUs, connections, inputs of every s
 
 import json
 import math
-import os
 import subprocess
 from pathlib import Path
 
@@ -31,8 +30,7 @@ def program(environment: str, name: str) -> str:
 
 def call(*command, cwd=None, timeout=120) -> str:
     """Runs a command; its output. A failure shows the last lines."""
-    done = subprocess.run([str(word) for word in command], cwd=cwd, capture_output=True, text=True, timeout=timeout,
-                          env={**os.environ, "PYTHONDONTWRITEBYTECODE": "1"})
+    done = subprocess.run([str(word) for word in command], cwd=cwd, capture_output=True, text=True, timeout=timeout)
     said = done.stdout + done.stderr
     assert done.returncode == 0, f"exit status {done.returncode}:\n" + "\n".join(said.splitlines()[-30:])
     return said
