@@ -3,7 +3,7 @@
 //
 //   tiefmu_bench kernels N         cycles at N slaves: loads to masters, accelerations, velocities, slave motion
 //   tiefmu_bench cycles COUPLING N COUNT   that many cycles and no timing, for instruction counts
-//   tiefmu_bench memory COUPLING N bytes per slave of a whole simulation, model included
+//   tiefmu_bench memory COUPLING N bytes per slave of an FMU's simulation, its model included
 //   tiefmu_bench fmu FOLDER        fmi2DoStep, set and get of an unpacked FMU (FOLDER holds binaries/, resources/)
 #include <dlfcn.h>
 #include <malloc.h>
@@ -163,6 +163,7 @@ void memory(const std::string& coupling, int slaves) {
   };
   const double before = used();
   auto model = std::make_shared<Model>(compile(surface(coupling, slaves, false)));
+  model->slaveReport = std::vector<SlaveReport>();  // an FMU's resource leaves it out
   const double compiled = used();
   Simulation simulation(model);
   simulation.initialise(0);

@@ -260,8 +260,9 @@ void checkSlaves(const Model& m) {
   requireSize(m.slaveOffset, 3 * slaves, "slave offsets");
   requireSize(m.slaveMass, slaves, "slave masses");
   requireSize(m.slaveInertia, slaves, "slave inertias");
-  requireSize(m.slaveStiffness, slaves, "slave stiffnesses");
-  requireSize(m.slaveRotationalStiffness, slaves, "rotational slave stiffnesses");
+  if (!m.slaveStiffness.empty()) requireSize(m.slaveStiffness, slaves, "slave stiffnesses");
+  if (!m.slaveRotationalStiffness.empty())
+    requireSize(m.slaveRotationalStiffness, slaves, "rotational slave stiffnesses");
   for (const auto* v : {&m.slaveOffset, &m.slaveMass, &m.slaveInertia, &m.slaveStiffness,
                         &m.slaveRotationalStiffness})
     requireFinite(*v, "slave numbers that are not finite");

@@ -64,6 +64,8 @@ void nodalStiffness(const Model& model, double* translation, double* rotation) {
   std::copy(model.nodeStiffness.begin(), model.nodeStiffness.end(), translation);
   std::copy_n(model.nodeRotationalStiffness.begin(), model.rotating(), rotation);
   std::vector<double> k = model.slaveStiffness, kr = model.slaveRotationalStiffness;
+  k.resize(model.slaves());
+  kr.resize(model.slaves());
   for (const Spring& spring : model.springs) {
     const double stiffness = spring.stiffness.maxCoeff(), turning = spring.rotationalStiffness.maxCoeff();
     for (const SpringEnd* end : {&spring.a, &spring.b}) {

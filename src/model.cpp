@@ -337,6 +337,8 @@ class Compiler {
       report.clamped = b.coupling != Coupling::meanMotion && b.projection.outside > 1 + 1e-12;
       model.slaveReport.push_back(report);
     }
+    for (auto* v : {&model.slaveStiffness, &model.slaveRotationalStiffness})
+      if (std::all_of(v->begin(), v->end(), [](double k) { return k == 0; })) *v = std::vector<double>();
     for (TieGroup& group : model.groups) {
       group.node.shrink_to_fit();
       group.begin.shrink_to_fit();

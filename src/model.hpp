@@ -90,7 +90,8 @@ struct Model {
   std::vector<std::int64_t> slaveId;
   std::vector<int> slaveNumber;            // j of slave[j]: from 1 by ascending id
   std::vector<double> slaveOffset;         // 3 per slave: d at the start
-  std::vector<double> slaveMass, slaveInertia, slaveStiffness, slaveRotationalStiffness;
+  std::vector<double> slaveMass, slaveInertia;
+  std::vector<double> slaveStiffness, slaveRotationalStiffness;  // empty where no slave declares any
   int turningSlaves = 0;                   // how many can turn
   std::vector<TieGroup> groups;            // in slave order: rotation, meanMotion, translation; quads before triangles
 
