@@ -1,4 +1,4 @@
-"""The command line: build, info, run, demo."""
+"""The command line: build, info, run, demo, study, advise."""
 
 import argparse
 import json
@@ -8,7 +8,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from . import __version__
+from . import __version__, advise, study
 from ._core import SceneError
 from .run import RunError
 
@@ -75,6 +75,9 @@ def parser() -> argparse.ArgumentParser:
     demo.add_argument("--out", metavar="DIR", type=Path, default=Path("out"), help="folder to write to (default: out)")
     demo.add_argument("--scenes", metavar="DIR", type=Path, help="folder of the scenes (default: of the checkout)")
     demo.set_defaults(command=run_demo)
+
+    study.add_parser(commands)
+    advise.add_parser(commands)
     return top
 
 

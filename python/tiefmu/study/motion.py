@@ -27,11 +27,15 @@ class Trajectory:
     energy_residual: float = np.nan
 
     def difference(self, other: "Trajectory") -> tuple[float, float, float]:
-        """Relative L2 of velocities and of loads over the whole run, and of velocities at its end."""
-        return relative(self.v, other.v), relative(self.f, other.f), relative(self.v[-1], other.v[-1])
+        """Relative L2 of velocities and of loads over the whole run; velocities at its end, relative to the largest
+        of the run, because many runs end at rest."""
+        top = float(np.sqrt((other.v**2).sum(axis=(1, 2)).max(initial=0.0)))
+        with np.errstate(over="ignore", invalid="ignore"):
+            end = float(np.linalg.norm(self.v[-1] - other.v[-1]))
+        return relative(self.v, other.v), relative(self.f, other.f), end / top if top > 0 else relative(end, 0.0)
 
 
-def relative(x: np.ndarray, exact: np.ndarray) -> float:
+def relative(x, exact) -> float:
     with np.errstate(over="ignore", invalid="ignore"):
         scale = float(np.linalg.norm(exact))
         error = float(np.linalg.norm(x - exact))

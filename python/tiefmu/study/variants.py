@@ -51,7 +51,8 @@ class Source:
         except SceneError as error:
             raise SceneError(f"{self.file}: {error}") from None
         self.scene = self.compile(self.tables)  # as it is: what is wrong with it shows here
-        self.gravity = Units(**self.tables.units.model_dump()).si("gravity", self.tables.model.gravity)
+        self.units = Units(**self.tables.units.model_dump())
+        self.gravity = self.units.si("gravity", self.tables.model.gravity)
         nodes = self.scene.model.report()["nodes"]
         moving = {MOTIONS[m] for m in nodes["motion"].tolist()}
         self.any_free, self.any_driven = "free" in moving, "driven" in moving

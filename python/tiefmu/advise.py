@@ -1,0 +1,316 @@
+"""What a scene needs and no more: the cheapest model, method and step whose error stays under a tolerance, measured."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from ._core import Diverged, SceneError
+
+SAFETY = 0.9      # of the stability limit: no step above it is advised
+HALVINGS = 12     # of the first step, before a method is given up
+ALIKE = 1.1       # costs closer than this factor count as equal; then the simpler choice wins
+
+
+def add_parser(commands):
+    from .cli import positive
+    parser = commands.add_parser(
+        "advise", help="say what a scene needs and no more",
+        description="Measures error and cost of every model and method that the scene allows, and names the cheapest "
+        "whose error stays under the tolerance: relative L2 over the whole run, of the slaves' velocities; of the "
+        "reactions too where every master is driven.")
+    parser.add_argument("scene", metavar="SCENE", help="scene file (TOML)")
+    parser.add_argument("--tolerance", metavar="E", type=positive, default=1e-3, help="relative error (default: 1e-3)")
+    parser.add_argument("--input", metavar="CSV", type=Path,
+                        help="inputs over time, as for `tiefmu run` (default: NAME.csv beside NAME.toml, if there)")
+    parser.add_argument("--write", metavar="NEW", type=Path, help="write the scene as advised")
+    parser.set_defaults(command=command)
+
+
+def command(options):
+    from .study.speed_accuracy import inputs_beside
+    from .study.variants import Source
+    if options.write and not options.write.parent.is_dir():
+        raise SceneError(f"{options.write}: folder {options.write.parent} does not exist")
+    source = Source(options.scene)
+    advice = advise(source, options.input or inputs_beside(options.scene), options.tolerance)
+    print("\n".join(advice.lines(source)))
+    if options.write:
+        options.write.write_text(written(source, advice, options), encoding="utf-8")
+        print(f"wrote {options.write}")
+
+
+@dataclass
+class Choice:
+    """One model, method and step with what was measured. step: s, of the integrator, or of the communication where
+    nothing is integrated."""
+    variant: object
+    method: str
+    reaction: str
+    step: float
+    error_v: float
+    error_f: float
+    cost: float              # s of CPU time per simulated second
+    coarser: tuple[float, float]  # next larger step that was tried, and its error (inf: unstable); nan: none
+
+    @property
+    def error(self) -> float:
+        """Of the velocities, and of the loads where motions are given."""
+        return max(self.error_v, self.error_f) if self.driven else self.error_v
+
+    @property
+    def driven(self) -> bool:
+        return self.method.endswith("input")
+
+
+@dataclass
+class Advice:
+    tolerance: float
+    choice: Choice
+    others: list[Choice]     # what else stays under the tolerance, cheapest first
+    models: list             # (variant, model error) of every model, cheapest first
+    mass_ratio: float        # r of the driven masters, nan: none
+    limit: float             # stability limit of the chosen method, s
+
+    def lines(self, source) -> list[str]:
+        c = self.choice
+        errors = dict(self.models)
+
+        def instead(variant):
+            return f"{error_text(errors[variant])} at any step" if variant in errors else "which this scene cannot have"
+
+        lines = [f"{source.file}: error {error_text(c.error)} of {error_text(self.tolerance)} allowed, "
+                 f"{c.cost:.3g} s CPU per simulated second"]
+        dropped = replace(c.variant, freedoms="translations")
+        if c.variant.freedoms != "all":
+            lines.append(f"freedoms: translations only; model error {error_text(errors[c.variant])}")
+        elif len(source.scene.rotations):
+            lines.append(f"freedoms: all; without the rotations of the masters the error is {instead(dropped)}")
+        else:
+            lines.append("freedoms: all (translations only; there are no rotations to leave out)")
+        for key, cheap, costly in (("inertia", "lumped", "consistent"), ("geometry", "small", "finite")):
+            chosen = getattr(c.variant, key)
+            if chosen == cheap:
+                lines.append(f"{key}: {cheap}; error of this model {error_text(errors[c.variant])} at any step")
+            else:
+                lines.append(f"{key}: {costly}; {cheap} would cost {instead(replace(c.variant, **{key: cheap}))}")
+        if c.driven:
+            lines.append(f"integrator: none, every master is driven; communication step {c.step:.4g} s with the "
+                         f"velocity of the {'start' if c.method == 'held input' else 'middle'} of the step held in it")
+        else:
+            lines.append(f"integrator: {c.method}, step {c.step:.4g} s, {c.step / self.limit:.2f} of its limit")
+        if not np.isnan(c.coarser[0]):
+            lines.append(f"  next larger step tried: {c.coarser[0]:.4g} s, error {error_text(c.coarser[1])}")
+        lines += [f"  instead: {describe(other)}: error {error_text(other.error)}, {other.cost / c.cost:.2f} times the "
+                  "CPU time" for other in self.others[:4]]
+        if not np.isnan(self.mass_ratio):
+            lines.append(self.reaction_line(c))
+        return lines
+
+    def reaction_line(self, c: Choice) -> str:
+        r = self.mass_ratio
+        ratio = "without bound (a driven master has no mass)" if np.isinf(r) else f"{r:.3g}"
+        full = (f"full is refused: the tied mass over the host's is r = {ratio}, and a host that uses the last known "
+                "force diverges at r >= 1 for every step" if not r < 1 else
+                f"full would be stable for a held force (r = {ratio} < 1), but not at r >= 1/2 with BDF2 velocities")
+        return f"reaction: {c.reaction}, stable for any host; {full}"
+
+
+def describe(c: Choice) -> str:
+    what = f"{c.variant.name}, {c.method}, step {c.step:.4g} s"
+    return f"{what}, {c.reaction}" if c.driven else what
+
+
+def error_text(error: float) -> str:
+    return "unbounded (unstable)" if not np.isfinite(error) else f"{error:.2g}" if error >= 1e-13 else "none"
+
+
+def advise(source, inputs: Path | None, tolerance: float) -> Advice:
+    """Raises SceneError, also where nothing reaches the tolerance."""
+    from .study.motion import Signals
+    signals = Signals.read(source.scene, inputs)
+    ratio = mass_ratio(source) if source.any_driven else np.nan
+    search = (FreeSearch if source.any_free else DrivenSearch)(source, signals, tolerance, ratio)
+    good, tried = [], []
+    for variant, error in search.models:
+        if error > tolerance:
+            continue
+        for method, reaction in search.methods(variant):
+            choice = search.largest_step(variant, method, reaction)
+            tried.append(choice)
+            if choice.error <= tolerance:
+                good.append(choice)
+    if not good:
+        least = min([choice.error for choice in tried] + [error for _, error in search.models if error > tolerance])
+        raise SceneError(f"{source.file}: tolerance {tolerance:g} is out of reach; the least error found is {least:.2g}")
+    good.sort(key=lambda choice: choice.cost)
+    # among the cheapest the simplest, in the order they were tried
+    best = next(choice for choice in tried if choice in good and choice.cost <= ALIKE * good[0].cost)
+    return Advice(tolerance, best, [choice for choice in good if choice is not best], search.models, ratio,
+                  search.limit(best))
+
+
+def mass_ratio(source) -> float:
+    """Largest eigenvalue of (host's mass)^-1 (mass that the tie adds), THEORY 5; inf where a host node has none."""
+    from .study.variants import Variant
+    scene = source.build(Variant())
+    nodes, simulation = scene.model.report()["nodes"], scene.simulation()
+    simulation.initialise(0.0)
+    driven, rotating = np.flatnonzero(nodes["motion"] == 0), nodes["rotating"]
+    unknowns = [("acceleration", i, k) for i in driven for k in range(3)]
+    unknowns += [("angular_acceleration", i, k) for i in driven if i < rotating for k in range(3)]
+    own = np.array([(nodes["mass"] if field == "acceleration" else nodes["inertia"])[i] for field, i, _ in unknowns])
+
+    def reaction():
+        loads = {"acceleration": simulation.get("reaction_force")}
+        if rotating:
+            loads["angular_acceleration"] = simulation.get("reaction_moment")
+        return np.array([loads[field][i, k] for field, i, k in unknowns])
+
+    zero, columns = reaction(), []
+    for field, i, k in unknowns:
+        a = np.zeros((len(nodes["id"]) if field == "acceleration" else rotating, 3))
+        a[i, k] = 1.0
+        simulation.set(field, a)
+        columns.append(zero - reaction())
+        simulation.set(field, 0 * a)
+    tied = np.array(columns).T
+    used = np.abs(tied).max(axis=0) > 1e-12 * max(np.abs(tied).max(initial=0.0), 1e-300)
+    if not used.any():
+        return 0.0
+    if not own[used].all():
+        return np.inf
+    return float(np.abs(np.linalg.eigvals(tied[np.ix_(used, used)] / own[used, None])).max())
+
+
+class Search:
+    """models: (variant, model error), the cheapest first."""
+
+    def __init__(self, source, signals, tolerance: float, ratio: float):
+        from .study import reference
+        from .study.variants import Variant, compiles
+        self.source, self.signals, self.tolerance, self.ratio = source, signals, tolerance, ratio
+        self.prepare()
+        small = max(1e-11, 1e-4 * tolerance)
+        self.reference, error = reference.solve(self.exact_run(Variant()), small)
+        if error[0] > 0.1 * tolerance:
+            raise SceneError(f"{source.file}: tolerance {tolerance:g} is out of reach; the reference itself is "
+                             f"only good to {error[0]:.2g}")
+        self.models = []
+        rotations = ["translations", "all"] if len(source.scene.rotations) else ["all"]
+        for variant in [Variant(inertia, geometry, freedoms=freedoms) for freedoms in rotations
+                        for geometry in ("small", "finite") for inertia in ("lumped", "consistent")]:
+            if compiles(source, variant):
+                own = reference.solve(self.exact_run(variant), max(1e-10, 1e-2 * tolerance))[0]
+                v, f, _ = own.difference(self.reference)
+                self.models.append((variant, max(v, f) if not source.any_free else v))
+
+    def limit(self, choice: Choice) -> float:
+        return np.inf
+
+    def refined(self, run, first: int, make) -> Choice:
+        """The fewest steps an interval, from `first` on, whose error is within the tolerance: doubled until it is,
+        then bisected."""
+        bad, bad_error, steps = 0, np.nan, first
+        for _ in range(HALVINGS):
+            errors = self.errors(run, steps)
+            if self.total(errors) <= self.tolerance or steps * self.intervals > 1e6:
+                break
+            bad, bad_error, steps = steps, self.total(errors), 2 * steps
+        good, good_errors = steps, errors
+        while bad and good - bad > max(1, good // 8) and self.total(good_errors) <= self.tolerance:
+            middle = (good + bad) // 2
+            errors = self.errors(run, middle)
+            if self.total(errors) <= self.tolerance:
+                good, good_errors = middle, errors
+            else:
+                bad, bad_error = middle, self.total(errors)
+        passed = self.total(good_errors) <= self.tolerance
+        return make(step=run.interval / good, error_v=good_errors[0], error_f=good_errors[1],
+                    cost=run.cost(good)[0] if passed else np.inf,
+                    coarser=(run.interval / bad, bad_error) if bad else (np.nan, np.nan))
+
+    def errors(self, run, steps: int) -> tuple[float, float]:
+        try:
+            return run.trajectory(steps).difference(self.reference)[:2]
+        except (Diverged, SceneError):
+            return np.inf, np.inf
+
+
+class FreeSearch(Search):
+    def prepare(self):
+        from .study.speed_accuracy import intervals
+        self.edges = intervals(self.source, self.signals)
+        self.intervals = len(self.edges) - 1
+
+    def run(self, variant, method):
+        from .study.motion import FreeRun
+        return FreeRun(self.source.build(variant, method, heavy=True), self.signals, self.edges)
+
+    def exact_run(self, variant):
+        return self.run(variant, "rk4")
+
+    def methods(self, variant):
+        from .study.variants import METHODS
+        reaction = "full" if np.isnan(self.ratio) else "loads" if variant.inertia == "lumped" else "split"
+        return [(method, reaction) for method in METHODS]
+
+    def total(self, errors) -> float:
+        return errors[0]
+
+    def limit(self, choice: Choice) -> float:
+        return self.run(choice.variant, choice.method).limit
+
+    def largest_step(self, variant, method, reaction) -> Choice:
+        run = self.run(variant, method)
+        first = max(1, int(np.ceil(run.interval / (SAFETY * run.limit))))
+        return self.refined(run, first, lambda **found: Choice(variant, method, reaction, **found))
+
+
+class DrivenSearch(Search):
+    def prepare(self):
+        from .study.driven import SAMPLES
+        if not self.signals.values:
+            raise SceneError(f"{self.source.file}: every master is driven and there is no input to drive it; give "
+                             "--input CSV")
+        self.intervals = SAMPLES
+
+    def exact_run(self, variant):
+        from .study.driven import HeavyRun
+        return HeavyRun(self.source.build(variant, "rk4", heavy=True), self.signals)
+
+    def methods(self, variant):
+        from .study.driven import METHODS
+        reactions = ["loads"] if variant.inertia == "lumped" else ["split"]
+        return [(method, reaction) for reaction in reactions for method in METHODS]
+
+    def total(self, errors) -> float:
+        return max(errors)
+
+    def largest_step(self, variant, method, reaction) -> Choice:
+        from .study.driven import DrivenRun
+        run = DrivenRun(self.source.build(variant, reaction=reaction), self.signals, reaction, method)
+        return self.refined(run, 1, lambda **found: Choice(variant, method, reaction, **found))
+
+
+def written(source, advice: Advice, options) -> str:
+    """The scene file with what was advised in place of what it had."""
+    import os
+
+    from .study import toml
+    c = advice.choice
+    tables = source.changed(c.variant)
+    if source.any_driven:
+        tables.model.reaction = c.reaction
+    raw = tables.model_dump(exclude_unset=True, exclude_none=True)
+    raw.setdefault("model", {}).update(inertia=c.variant.inertia, geometry=c.variant.geometry)
+    if source.any_driven:
+        raw["model"]["reaction"] = c.reaction
+    if not c.driven:
+        per = source.units.si("time_step", 1.0)
+        raw["integrator"] = {"method": c.method, "time_step": float(c.step / per), "safety": SAFETY}
+    if "file" in raw["mesh"]:
+        mesh = (source.folder / raw["mesh"]["file"]).resolve()
+        raw["mesh"]["file"] = Path(os.path.relpath(mesh, options.write.resolve().parent)).as_posix()
+    head = f"# {Path(options.scene).name} as advised for an error of {options.tolerance:g}"
+    return "\n".join([head, *(f"# {line}" for line in advice.lines(source)[1:]), toml.text(raw)])
