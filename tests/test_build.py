@@ -462,11 +462,13 @@ def test_archive(weld, tmp_path):
     with zipfile.ZipFile(tiefmu.build(tiefmu.load(weld), tmp_path / "weld.fmu")) as archive:
         infos = archive.infolist()
         assert [info.filename for info in infos] == \
-            [f"binaries/{package.PLATFORM}/scene{package.SUFFIX}", "modelDescription.xml", "resources/report.json",
-             "resources/scene.bin"]
+            [f"binaries/{package.PLATFORM}/scene{package.SUFFIX}", "documentation/index.html",
+             *(f"documentation/licenses/{name}.txt" for name in ("cereal", "fmi", "license")),
+             "extra/tiefmu/reference_in.csv", "extra/tiefmu/reference_out.csv", "model.png", "modelDescription.xml",
+             "resources/report.json", "resources/scene.bin", "terminalsAndIcons/terminalsAndIcons.xml"]
         assert {info.date_time for info in infos} == {(1980, 1, 1, 0, 0, 0)}
         assert {info.compress_type for info in infos} == {zipfile.ZIP_DEFLATED}
-        assert [oct(info.external_attr >> 16) for info in infos] == ["0o755", "0o644", "0o644", "0o644"]
+        assert [oct(info.external_attr >> 16) for info in infos] == ["0o755"] + ["0o644"] * 11
         assert json.loads(archive.read("resources/report.json")) == found(weld)
 
 

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from . import _core
 from ._core import SceneError
+from .extras import extras
 from .report import report
 from .scene import Scene
 
@@ -42,13 +43,14 @@ def contents(scene: Scene) -> dict[str, bytes]:
     identifier = _core.model_identifier(scene.name)
     xml = scene.model.xml(scene.name, scene.title, "")
     guid = model_guid(scene, xml)
+    found = report(scene)
     return {
         # put in by hand, because large models take a while to describe twice
         "modelDescription.xml": xml.replace(b'guid=""', f'guid="{guid}"'.encode(), 1),
         f"binaries/{PLATFORM}/{identifier}{SUFFIX}": binary(),
         "resources/scene.bin": scene.model.resource(guid),
-        "resources/report.json": json.dumps(report(scene), allow_nan=False).encode(),
-    }
+        "resources/report.json": json.dumps(found, allow_nan=False).encode(),
+    } | extras(scene, found, xml)
 
 
 def model_guid(scene: Scene, xml: bytes) -> str:

@@ -29,12 +29,13 @@ class Scene:
     """A checked and compiled scene; made by `load`.
 
     file: how messages call the source; name: of the model, from the file's name; title; notes: remarks of the reading
-    (list of str); ties: the [[tie]] tables in order; rotations: ids of the nodes declared with rotations; model: the
-    compiled `_core.Model`; start: a `_core.Simulation` of it, initialised at time 0.
+    (list of str); ties: the [[tie]] tables in order; settings: the [model] table; rotations: ids of the nodes declared
+    with rotations; model: the compiled `_core.Model`; start: a `_core.Simulation` of it, initialised at time 0.
     """
 
     def __init__(self, file: str, name: str, tables: schema.SceneTables, folder: Path):
         self.file, self.name, self.title, self.ties = file, name, tables.title, tables.tie
+        self.settings = tables.model
         assembly = Assembly(tables, folder)
         self.notes = assembly.mesh.notes
         self.rotations = assembly.mesh.node_id[assembly.rotations]

@@ -1,0 +1,23 @@
+"""What an FMU carries beside model and binary (FMI 2.0.4, section 2.3): for people and for tools that connect FMUs."""
+
+from pathlib import Path
+
+from .extras_page import page
+from .extras_picture import Picture
+from .extras_reference import reference
+from .extras_terminals import terminals
+from .scene import Scene
+
+LICENSES = Path(__file__).parent / "licenses"
+
+
+def extras(scene: Scene, found: dict, xml: bytes) -> dict[str, bytes]:
+    """Path in the archive -> bytes. found: the scene's report; xml: its model description."""
+    picture = Picture(scene.model.report()["nodes"], found)
+    files = {
+        "documentation/index.html": page(scene, found, picture),
+        "model.png": picture.png(),
+        "terminalsAndIcons/terminalsAndIcons.xml": terminals(scene),
+    }
+    files |= {f"documentation/licenses/{path.name}": path.read_bytes() for path in LICENSES.glob("*.txt")}
+    return files | reference(scene, xml)

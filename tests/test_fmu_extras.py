@@ -1,0 +1,163 @@
+"""Documentation, picture, terminals, licences and reference results of an FMU."""
+
+import io
+import re
+import subprocess
+import sys
+import zipfile
+from html.parser import HTMLParser
+from pathlib import Path
+
+import fmpy
+import numpy as np
+import pytest
+from lxml import etree
+
+import tiefmu
+from fmu_calls import OK, Fmu, Instance
+
+SCENES = sorted((Path(__file__).parents[1] / "scenes").glob("*.toml"))
+VOID = {"meta", "img", "br"}
+
+
+@pytest.fixture(scope="module", params=SCENES, ids=lambda path: path.stem)
+def files(request, tmp_path_factory):
+    """Scene, description, and path in the archive -> bytes."""
+    scene = tiefmu.load(request.param)
+    path = tiefmu.build(scene, tmp_path_factory.mktemp("fmu") / "scene.fmu")
+    with zipfile.ZipFile(path) as archive:
+        return scene, fmpy.read_model_description(str(path)), {name: archive.read(name) for name in archive.namelist()}
+
+
+class Balanced(HTMLParser):
+    """Complains of a tag that is closed out of turn; collects text and the addresses that the page refers to."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.open, self.text, self.links = [], "", []
+        self.feed(text)
+        assert not self.open
+
+    def handle_starttag(self, tag, attributes):
+        self.links += [value for key, value in attributes if key in ("href", "src")]
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag, attributes):
+        pass
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        self.text += data
+
+
+def test_the_page_shows_the_scene(files):
+    scene, _, found = files
+    text = found["documentation/index.html"].decode()
+    page = Balanced(text)
+    assert scene.title in page.text
+    report = tiefmu.report(scene)
+    for row in report["ties"]:
+        assert row["name"] in page.text and row["formulation"] in page.text
+    assert text.count("<svg") == 1 and text.count('<path d="M') == len(report["slaves"]) + len(
+        {row["segment"] for row in report["slaves"]})
+    for row in report["slaves"][:200]:
+        assert f"<td>{row['number']}</td><td>{row['id']}</td>" in text
+    assert "slave[j].f" in page.text and "master[i].f" in page.text and "inertial frame" in page.text
+    for link in page.links:
+        assert f"documentation/{link}" in found
+
+
+def test_a_title_cannot_break_the_page(weld, tmp_path):
+    weld["title"] = "<b>A & \"B\"</b> ü"
+    weld["tie"][0]["name"] = "<i>"
+    with zipfile.ZipFile(tiefmu.build(tiefmu.load(weld), tmp_path / "a.fmu")) as archive:
+        page = Balanced(archive.read("documentation/index.html").decode())
+    assert weld["title"] in page.text and "<i>" in page.text
+
+
+def test_the_picture_is_a_png_of_the_scene(files):
+    from matplotlib import image  # an independent reader
+    _, _, found = files
+    pixels = image.imread(io.BytesIO(found["model.png"]), format="png")
+    assert pixels.shape == (360, 480, 3)
+    dark = pixels.sum(axis=2) < 2.9
+    assert 0.005 < dark.mean() < 0.9
+    rows, columns = np.flatnonzero(dark.any(axis=1)), np.flatnonzero(dark.any(axis=0))
+    assert columns[-1] - columns[0] > 400 or rows[-1] - rows[0] > 280  # fills the frame
+    assert min(rows[0], 359 - rows[-1], columns[0], 479 - columns[-1]) > 10  # and stays inside
+    red = (pixels[..., 0] > pixels[..., 2] + 0.3)
+    assert red.sum() > 20  # slaves
+
+
+def schema() -> etree.XMLSchema:
+    """FMI 2.0.4 takes terminals and icons from FMI 3.0."""
+    return etree.XMLSchema(etree.parse(str(Path(fmpy.__file__).parent / "schema/fmi3/fmi3TerminalsAndIcons.xsd")))
+
+
+def test_one_terminal_for_each_master_and_slave(files):
+    _, description, found = files
+    root = etree.fromstring(found["terminalsAndIcons/terminalsAndIcons.xml"])
+    valid = schema()
+    assert valid.validate(root), valid.error_log
+    expected = {}
+    for variable in description.modelVariables:
+        match = re.fullmatch(r"((?:master|slave)\[\d+\])\.(.+)", variable.name)
+        if match:
+            expected.setdefault(match[1], {})[match[2]] = variable.name
+    terminals = {terminal.get("name"): {m.get("memberName"): m.get("variableName") for m in terminal}
+                 for terminal in root.iter("Terminal")}
+    assert terminals == expected and len(terminals) == len(root.findall("Terminals/Terminal"))
+    described = {variable.name: variable.description for variable in description.modelVariables}
+    for terminal in root.iter("Terminal"):
+        node = terminal.get("description").split(", ")[1]
+        assert all(described[member.get("variableName")].endswith(f"({node})") for member in terminal)
+        assert terminal.get("matchingRule") == "plug"
+
+
+def test_licences_name_what_is_compiled_in(files):
+    _, _, found = files
+    text = found["documentation/licenses/license.txt"].decode()
+    for part in ("tiefmu", "Eigen", "cereal", "FMI", "libstdc++"):
+        assert part in text
+    for name in re.findall(r"\w+\.txt", text):
+        assert b"Copyright" in found[f"documentation/licenses/{name}"]
+
+
+def table(data: bytes) -> np.ndarray:
+    return np.genfromtxt(io.BytesIO(data), delimiter=",", names=True, deletechars="", replace_space=" ")
+
+
+@pytest.mark.parametrize("path", [p for p in SCENES if p.stem in ("spotweld", "rivet", "heavy_slave_split", "spinning")],
+                         ids=lambda path: path.stem)
+def test_reference_results_are_what_the_fmu_answers(path, tmp_path):
+    fmu = Fmu(path, tmp_path)
+    inputs, outputs = (table((fmu.folder / "extra" / "tiefmu" / f"reference_{what}.csv").read_bytes())
+                       for what in ("in", "out"))
+    assert set(inputs.dtype.names[1:]) == set(fmu.names("input"))
+    assert set(outputs.dtype.names[1:]) == set(fmu.names("output"))
+    values = [dict(zip(inputs.dtype.names[1:], row.tolist()[1:])) for row in inputs]
+    instance = Instance(fmu).start(values=values[0])
+    names = outputs.dtype.names[1:]
+    np.testing.assert_array_equal(instance.get(names), outputs[0].tolist()[1:])
+    step = inputs["time"][1]
+    for k in range(len(inputs) - 1):
+        assert instance.set(values[k]) == OK
+        assert instance.step(inputs["time"][k], step) == OK, instance.log
+        np.testing.assert_array_equal(instance.get(names), outputs[k + 1].tolist()[1:])
+    assert any(np.ptp(outputs[name]) > 0 for name in names)
+    instance.free()
+
+
+def test_large_scenes_have_no_reference_results(files):
+    _, description, found = files
+    assert ("extra/tiefmu/reference_in.csv" in found) == (len(description.modelVariables) <= 2000)
+
+
+def test_a_build_imports_nothing_slow(weld, scene_file):
+    code = ("import sys, tiefmu; tiefmu.build(tiefmu.load(sys.argv[1]), 'a.fmu'); "
+            "print([m for m in ('matplotlib', 'fmpy', 'tqdm') if m in sys.modules])")
+    done = subprocess.run([sys.executable, "-c", code, scene_file(weld)], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
