@@ -52,8 +52,8 @@ class Names:
 
 
 class Tie:
-    """The tie as its host sees it: loads from motions. `start`: positions of the driven masters, flat, m; `own`, `added`:
-    the masters' own and the lumped inertia per freedom (kg, kg m2)."""
+    """The tie as its host sees it: loads from motions. `start`: positions of the driven masters, flat, m; `own`,
+    `added`: the masters' own and the lumped inertia per freedom (kg, kg m2)."""
 
     def __init__(self, scene: Scene):
         self.names = Names(scene)
@@ -70,7 +70,7 @@ class Tie:
         self.added = np.repeat(np.concatenate([added_mass[driven], added_inertia[turning]]), 3)
         self.accelerated, self.positioned = bool(self.names.acceleration), bool(self.names.position)
         self.inputs = np.zeros(len(self.names.inputs))
-        # Do loads of small motions depend on more than the inputs of now? Springs that see an offset turn, or free nodes.
+        # Do loads of small motions depend on more than the inputs of now: on springs at offsets, on free nodes?
         found = scene.model.report()
         turning = (found["slaves"]["coupling"] != found["couplings"].index("translation")).any()
         free = (found["nodes"]["motion"] == MOTIONS.index("free")).any()
@@ -127,8 +127,8 @@ class InProcess(Tie):
 
 
 class Packaged(Tie):
-    """By the packaged FMU under FMPy. Its calls take arrays made once, because FMPy's own conversions cost more than the
-    FMU does. Use as a context manager."""
+    """By the packaged FMU under FMPy. Its calls take arrays made once, because FMPy's own conversions cost more than
+    the FMU does. Use as a context manager."""
 
     def __init__(self, scene: Scene):
         super().__init__(scene)
@@ -214,8 +214,8 @@ class Masses:
     damping: np.ndarray
 
     def propagator(self, step: float) -> np.ndarray:
-        """(2, 5, freedoms): u and H u' after the step, from u, H u' and the coefficients of the acceleration H^2 load/mass
-        as a polynomial of degree two in (time / H)."""
+        """(2, 5, freedoms): u and H u' after the step, from u, H u' and the coefficients of H^2 load/mass as a
+        polynomial of degree two in (time / H)."""
         kinds, which = np.unique(np.column_stack([step**2 * self.stiffness, step * self.damping])
                                  / self.mass[:, None], axis=0, return_inverse=True)
         generator = np.zeros((len(kinds), 5, 5))
@@ -228,9 +228,9 @@ class Masses:
 class Coupling:
     """Host and tie in turns, each H long: the tie answers the host's motion, the host moves on with that answer.
 
-    order: 0 load held, 1 linear, 2 quadratic extrapolation. differenced: the acceleration that the tie gets is the second
-    order backward difference (BDF2) of the velocities in place of the host's own. host: with the inertia that the tie's
-    `reaction` asks the host to carry.
+    order: 0 load held, 1 linear, 2 quadratic extrapolation. differenced: the acceleration that the tie gets is the
+    second order backward difference (BDF2) of the velocities in place of the host's own. host: with the inertia that
+    the tie's `reaction` asks the host to carry.
     """
 
     def __init__(self, tie: Tie, host: Masses, step: float, order: int = 0, differenced: bool = False):
@@ -289,8 +289,8 @@ class Coupling:
         return np.array(columns).T
 
     def radius(self) -> float:
-        """Spectral radius of the one-step map. Freedoms without springs drift, which is no growth: their displacement is
-        left out."""
+        """Spectral radius of the one-step map. Freedoms without springs drift, which is no growth: their displacement
+        is left out."""
         matrix, n = self.matrix(), len(self.host.mass)
         drifting = np.flatnonzero(np.abs(matrix[n:, :n]).max(axis=0) == 0)
         kept = np.setdiff1d(np.arange(len(matrix)), drifting)
@@ -299,8 +299,8 @@ class Coupling:
         return float(np.abs(np.linalg.eigvals(matrix * weight[:, None] / weight)).max())
 
     def growth(self, steps: int, seed: int = 1) -> float:
-        """Measured growth of the accelerations per step, from the second to the last quarter of a run from a random state;
-        infinite where they overflow, 0 where they vanish. A run ends early where only rounding is left."""
+        """Measured growth of the accelerations per step, from the second to the last quarter of a run from a random
+        state; infinite where they overflow, 0 where they vanish. A run ends early where only rounding is left."""
         rng = np.random.default_rng(seed)
         state = rng.normal(size=(self.rows, len(self.host.mass))) / self.units()[:, None]
         self.tie.restart()

@@ -45,7 +45,7 @@ class Value:
 
 
 def edge(fails: Callable[[float], bool], closed: float, reach: float = 1.2, precision: float = 1e-3) -> float:
-    """Where `fails` changes, by bisection within a factor `reach` of the closed form; NaN if it does not change there."""
+    """Where `fails` changes, by bisection within a factor `reach` of the closed form; NaN if it does not change."""
     low, high = closed / reach, closed * reach
     if fails(low) or not fails(high):
         return float("nan")
@@ -77,8 +77,8 @@ def plate(slave_mass: float, reaction: str, spring=(0.0, 0.0), place=(0.5, 0.5, 
 
 def coupled(scene: Scene, reaction: str, step: float, order: int = 0, differenced: bool = False, omega: float = 0.0,
             zeta: float = 0.0, share: float = 1.0) -> Coupling:
-    """The scene's host at this step. omega, zeta: of each master alone on its ground spring (rad/s, 1); share: the part of
-    D that the host carries where the reaction asks for D (THEORY 5)."""
+    """The scene's host at this step. omega, zeta: of each master alone on its ground spring (rad/s, 1); share: the part
+    of D that the host carries where the reaction asks for D (THEORY 5)."""
     tie = InProcess(scene)
     carried = 0.0 if reaction == "full" else share
     return Coupling(tie, Masses(tie.own + carried * tie.added, tie.own * omega**2, tie.own * 2 * zeta * omega), step,

@@ -52,7 +52,7 @@ def run(options) -> int:
     figures = [draw(limit_table, options.out), stability_map.draw(points, options.out)]
     write_page(options.out / "stability.html", limit_table, value_table, points, figures)
     show(limit_table, value_table, points)
-    print(f"wrote stability_limits.csv, stability_values.csv, stability_map.csv, charts and stability.html to {options.out}")
+    print(f"wrote CSVs, charts and stability.html to {options.out}")
     return int(any(row[-1] != "ok" for row in limit_table + value_table))
 
 
@@ -90,7 +90,7 @@ def show(limit_table: list, value_table: list, points: list):
             if row[0] == item:
                 print(f"  {row[-1]:<4}{row[1]:<56} {row[2]:<24} closed {row[3]:<9.5g} measured: {row[4]:.5g}")
     both = [p for p in points if p.growth == p.growth]
-    print(f"\nmap: {len(points)} points by spectral radius; of {len(both)} also decided by a run, {agreeing(both)} agree")
+    print(f"\nmap: {len(points)} points by spectral radius; of {len(both)} also decided by runs {agreeing(both)} agree")
 
 
 def agreeing(points: list) -> int:
@@ -101,6 +101,7 @@ def draw(limit_table: list, folder: Path) -> Path:
     """Measured over closed-form limits, writes stability_limits.png and .svg; returns the latter."""
     import matplotlib
     matplotlib.use("Agg")
+    matplotlib.rcParams["svg.hashsalt"] = "limits"  # the same ids in every run
     import matplotlib.pyplot as plt
 
     rows = limit_table[::-1]
@@ -128,13 +129,14 @@ def write_page(path: Path, limit_table: list, value_table: list, points: list, f
         "radius; where the program states the limit itself, that is shown as well."], [
         page.Section("Limits", ["A limit is right if all the ways to find it end within 2 % of the closed form."],
                      [("Measured limits over their closed forms.", figures[0])], LIMIT_COLUMNS, limit_table),
-        page.Section("Values", ["Rates, drifts and errors that a closed form predicts."], [], VALUE_COLUMNS, value_table),
+        page.Section("Values", ["Rates, drifts and errors that a closed form predicts."], [], VALUE_COLUMNS,
+                     value_table),
         page.Section("Map", [
-            "Colours come from the eigenvalues of the one-step map: red where one is larger than 1, else the error of the "
-            "worst mode's complex frequency against the monolithic system. Circles and crosses are runs: of "
+            "Colours come from the eigenvalues of the one-step map: red where one is larger than 1, else the error of "
+            "the worst mode's complex frequency against the monolithic system. Circles and crosses are runs: of "
             f"{len(both)}, {agreeing(both)} agree with the eigenvalues.",
             "'loads' is always stable, and as wrong as its lumping. 'full' ends at r = 1 whatever the step. 'split' "
-            "survives every ratio as the step goes to zero; at finite steps the held load lags behind the host's springs, "
-            "which feeds energy in, and the host's damping has to outweigh it: H omega < 2 zeta (1 + r)/(r (r + 1/2)). "
-            "Linear extrapolation moves that limit far up."],
+            "survives every ratio as the step goes to zero; at finite steps the held load lags behind the host's "
+            "springs, which feeds energy in, and the host's damping has to outweigh it: H omega < 2 zeta (1 + r)/(r (r + "
+            "1/2)). Linear extrapolation moves that limit far up."],
             [("Stability and accuracy over mass ratio and communication step.", figures[1])])])

@@ -24,7 +24,7 @@ def limits() -> list[Limit]:
             *geometry_limits()]
 
 
-# ------------------------------------------------------------------------------------------------- 1: reaction "full"
+# --------------------------------------------------------------------------------------------------- 1: reaction "full"
 
 def full_limits() -> list[Limit]:
     """r = m / 4 M, whatever the step: 1, 1/2, 1/(2^(k+1) - 1) (THEORY 5)."""
@@ -78,7 +78,7 @@ def split_values() -> list[Value]:
     return found
 
 
-# ------------------------------------------------------------------------------------------- 3: spring-damper exchange
+# -------------------------------------------------------------------------------------------- 3: spring-damper exchange
 
 def exchange(step: float, zeta: float):
     """Host of 4 kg, spring-damper of omega = 1 rad/s on the slave."""
@@ -97,7 +97,7 @@ def held_value() -> list[Value]:
                   exchange(x, 0.0).growth(3000) - 1, 0.02) for x in (0.1, 0.5)]
 
 
-# -------------------------------------------------------------------------------------------------------- 4: integrators
+# ------------------------------------------------------------------------------------------------------- 4: integrators
 
 METHODS = {"central-difference": 2.0, "symplectic-euler": 2.0, "noh-bathe": 3.74, "rk4": np.sqrt(8)}
 
@@ -143,10 +143,10 @@ def integrator_limits() -> list[Limit]:
     return found
 
 
-# ---------------------------------------------------------------------------------------------- 5: hole in the nodal rule
+# -------------------------------------------------------------------------------------------- 5: hole in the nodal rule
 
 def hole() -> FreeRun:
-    """Default tie with an offset, masters without inertia of their own, a spring from the slave to an equal free mass."""
+    """Default tie with an offset, masters without inertia of their own, a spring from slave to an equal free mass."""
     return FreeRun(load({
         "mesh": {"nodes": [[1, -1, -1, 0], [2, 1, -1, 0], [3, 1, 1, 0], [4, -1, 1, 0], [5, 0, 0, 0.3], [6, 1, 0, 0.3]],
                  "segments": [[1, 1, 2, 3, 4]]},
@@ -165,15 +165,15 @@ def hole_limits() -> list[Limit]:
 
 
 def hole_values() -> list[Value]:
-    """As the issue of the nodal rule puts it: 0.81 of it passes, 0.83 and the customary 0.9 diverge, and the program's own
-    limit is safe at 1.0. Grows is 1, does not 0."""
+    """0.81 of the nodal step passes, 0.83 and the customary 0.9 diverge; the program's own limit is safe at 1.0. Grows
+    is 1, does not 0."""
     run = hole()
     cases = [("0.81 of the nodal step", 0.81 * run.nodal, 0), ("0.83 of the nodal step", 0.83 * run.nodal, 1),
              ("0.9 of the nodal step", 0.9 * run.nodal, 1), ("1.0 of the program's own limit", run.limit, 0)]
     return [Value("5", case, "grows", expected, float(run.grows(step)), 0.0) for case, step, expected in cases]
 
 
-# --------------------------------------------------------------------------------------------------------- 6: orientation
+# ------------------------------------------------------------------------------------------------------- 6: orientation
 
 FRAMES = 1000
 
@@ -218,11 +218,11 @@ def orientation_values() -> list[Value]:
             Value("6", "row-sum rule, largest", "row sum / lambda", 1.35, float(max(ratio)), 0.1)]
 
 
-# ------------------------------------------------------------------------------------------------------ 7: spinning offset
+# --------------------------------------------------------------------------------------------------- 7: spinning offset
 
 def spin_drift(theta: float, half: float, revolutions: int = 3) -> float:
-    """Relative growth of the offset per revolution when its end is integrated from its velocity, with the part `half` of
-    the centripetal term w x (w x d) h^2; theta: rotation per step, rad."""
+    """Relative growth of the offset per revolution when its end is integrated from its velocity, with the part `half`
+    of the centripetal term w x (w x d) h^2; theta: rotation per step, rad."""
     d, w = np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, theta])
     steps = round(2 * np.pi / theta)
     for _ in range(revolutions * steps):
@@ -257,7 +257,7 @@ def drift_values() -> list[Value]:
     return found
 
 
-# -------------------------------------------------------------------------- 8: outside the segment, collinear masters
+# ---------------------------------------------------------------------------- 8: outside the segment, collinear masters
 
 def outside(xi: float, eta: float) -> dict:
     """Phi as it is and clamped, of a point above (xi, eta) of the unit square."""
@@ -281,7 +281,8 @@ def refuses(aspect: float) -> bool:
 
 
 def geometry_limits() -> list[Limit]:
-    """Masses m_i + Phi_i m_s turn negative past m_s/m_i = 1/|Phi_min|; cond(Ibar) = 1 + (a/b)^2 is refused past 1e12."""
+    """Masses m_i + Phi_i m_s turn negative past m_s/m_i = 1/|Phi_min|; cond(Ibar) = 1 + (a/b)^2 is refused past
+    1e12."""
     found = []
     for xi, eta in ((1.5, 1.5), (1.3, 0.2), (1.1, 1.1)):
         phi = outside(xi, eta)["phi"][0]
@@ -293,8 +294,8 @@ def geometry_limits() -> list[Limit]:
 
 
 def frequencies(inertia: str, projection: dict, slave_mass: float) -> np.ndarray:
-    """Of four free masters of 1 kg on springs of 1 N/m, along z, rad/s ascending: from the accelerations that the solver
-    answers unit displacements with."""
+    """Of four free masters of 1 kg on springs of 1 N/m, along z, rad/s ascending: from the accelerations that the
+    solver answers unit displacements with."""
     corners = np.array(SQUARE)[:, 1:]
     slave = projection["phi"][0] @ corners
     simulation = load({

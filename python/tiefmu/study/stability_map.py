@@ -35,8 +35,7 @@ def point(reaction: str, order: int, ratio: float, step: float, run: bool) -> Po
     coupling = coupled(scene, reaction, step, order, omega=1.0, zeta=ZETA)
     units = np.repeat(coupling.units(), len(coupling.host.mass))
     roots = np.linalg.eigvals(coupling.matrix() * units[:, None] / units)
-    with np.errstate(divide="ignore"):
-        found = np.log(roots.astype(complex)) / step
+    found = np.log(roots[np.abs(roots) > 1e-12].astype(complex)) / step
     # Modes that move the slave (three, alike) and those that do not: (1 + tied) x'' + 2 zeta x' + x = 0
     error = 0.0
     for tied in (0.0, ratio):
@@ -47,8 +46,8 @@ def point(reaction: str, order: int, ratio: float, step: float, run: bool) -> Po
 
 
 def grown(coupling, period: float) -> float:
-    """Growth per step over eight of the slowest periods (each so many steps); NaN where those are too many steps and the
-    run has not made itself plain before."""
+    """Growth per step over eight of the slowest periods (each so many steps); NaN where those are too many steps and
+    the run has not made itself plain before."""
     wanted = int(np.ceil(8 * period))
     steps = min(wanted, MAX_STEPS)
     growth = coupling.growth(steps)
@@ -80,6 +79,7 @@ def draw(found: list[Point], folder: Path) -> Path:
     """Writes stability_map.png and .svg; returns the latter."""
     import matplotlib
     matplotlib.use("Agg")
+    matplotlib.rcParams["svg.hashsalt"] = "map"  # the same ids in every run
     import matplotlib.pyplot as plt
     from matplotlib.colors import ListedColormap
     from matplotlib.lines import Line2D
@@ -94,12 +94,12 @@ def draw(found: list[Point], folder: Path) -> Path:
         own = [p for p in found if (p.reaction, p.order) == (reaction, order)]
         ratios, steps = sorted({p.ratio for p in own}), sorted({p.step for p in own})
         level = np.array([len(CLASSES) + 1 if not p.stable else np.searchsorted(CLASSES, p.error) for p in own])
-        axis.pcolormesh(ratios, steps, level.reshape(len(ratios), len(steps)).T, cmap=ListedColormap(colours), vmin=-0.5,
-                        vmax=4.5, shading="nearest", rasterized=True)
+        axis.pcolormesh(ratios, steps, level.reshape(len(ratios), len(steps)).T, cmap=ListedColormap(colours),
+                        vmin=-0.5, vmax=4.5, shading="nearest", rasterized=True)
         for p in own:
             if p.growth == p.growth:
-                axis.plot(p.ratio, p.step, "x" if p.growth > GROWS else "o", color="black", markersize=4, fillstyle="none",
-                          markeredgewidth=0.9)
+                axis.plot(p.ratio, p.step, "x" if p.growth > GROWS else "o", color="black", markersize=4,
+                          fillstyle="none", markeredgewidth=0.9)
         if reaction == "full":
             axis.axvline(1.0, color="black", linestyle="--", linewidth=1.2)
         if (reaction, order) == ("split", 0):

@@ -1,0 +1,127 @@
+"""The stability study: every limit bracketed within 2 %, the check beyond the limit as its own control."""
+
+import argparse
+import csv
+import math
+
+import numpy as np
+import pytest
+
+from tiefmu.study import limits, stability, stability_cases, stability_map
+
+LIMITS = stability_cases.limits()
+VALUES = [value for cases in stability_cases.VALUES for value in cases()]
+
+
+def test_every_item_is_there():
+    assert {row.item for row in LIMITS + VALUES} == set(stability_cases.ITEMS) == set("12345678")
+
+
+@pytest.mark.parametrize("limit, way", [(limit, way) for limit in LIMITS for way in limit.tests()],
+                         ids=lambda value: value if isinstance(value, str) else f"{value.item}: {value.case}")
+def test_limit_is_bracketed(limit, way):
+    fails = limit.tests()[way]
+    assert not fails(0.98 * limit.closed)
+    assert fails(1.02 * limit.closed)  # the control: the same check just beyond
+
+
+@pytest.mark.parametrize("limit", [limit for limit in LIMITS if limit.stated], ids=lambda limit: limit.case)
+def test_the_program_states_the_limit(limit):
+    assert limit.stated == pytest.approx(limit.closed, rel=0.02)
+
+
+@pytest.mark.parametrize("method, closed", stability_cases.METHODS.items())
+def test_integrator_at_99_and_101_percent(method, closed):
+    run = stability_cases.free_plate(3.0, method)
+    assert not run.grows(0.99 * run.limit)
+    assert run.grows(1.01 * run.limit)
+
+
+@pytest.mark.parametrize("value", VALUES, ids=lambda value: f"{value.item}: {value.case}")
+def test_value(value):
+    assert abs(value.measured - value.closed) <= value.tolerance * (abs(value.closed) or 1)
+
+
+@pytest.mark.parametrize("step", [1.0, 0.1, 0.01])
+@pytest.mark.parametrize("ratio", [1.0, 10.0, 1000.0])
+def test_split_and_loads_are_stable_for_every_mass_ratio(ratio, step):
+    """A host of free masses; `full` is the control."""
+    for reaction, stable in (("loads", True), ("split", True), ("full", False)):
+        scene = limits.plate(4.1 * ratio, reaction)  # 4 would be the very limit of `full` at r = 1
+        coupling = limits.coupled(scene, reaction, step)
+        assert (coupling.growth(400) < 1) == stable
+        assert (coupling.radius() <= limits.GROWS) == stable
+
+
+@pytest.mark.parametrize("ratio", [1.0, 10.0])
+def test_split_on_an_undamped_sprung_host_grows(ratio):
+    """By (H omega)^2 r (r + 1/2) / (2 (1 + r)) a step to leading order; extrapolated linearly, by less than a hundredth
+    of that."""
+    step = 0.01 / ratio
+    held = limits.coupled(limits.plate(4 * ratio, "split"), "split", step, omega=1.0).radius() - 1
+    linear = limits.coupled(limits.plate(4 * ratio, "split"), "split", step, order=1, omega=1.0).radius() - 1
+    assert held == pytest.approx(step**2 * ratio * (ratio + 0.5) / (2 * (1 + ratio)), rel=0.02)
+    assert linear < 0.01 * held
+
+
+def test_row_sum_rule_fails_where_lambda_does_not():
+    """The control of item 6: as the segment turns, the row-sum rule spreads and falls below what it should bound."""
+    corners = np.array([[-2.5, -0.5, 0], [2.5, -0.5, 0], [2.5, 0.5, 0], [-2.5, 0.5, 0]])
+    rule, lam = [], []
+    for turn in stability_cases.frames(100):
+        found = limits._core.kernels.node_inertia(corners @ turn.T)
+        rule.append(stability_cases.row_sum(found["ibar"]))
+        lam.append(found["lambda"])
+    assert np.ptp(lam) < 1e-12 * np.mean(lam)
+    assert np.ptp(rule) > np.mean(lam)
+    assert min(rule) < 0.2 * np.mean(lam)
+
+
+def test_drift_of_integrated_velocities_fails_the_check():
+    """The control of item 7: what this program passes, velocity-integrated positions do not, tiny steps or not."""
+    assert stability_cases.program_drift(2 * np.pi / 2000, 1) < 1e-12
+    assert stability_cases.spin_drift(2 * np.pi / 2000, 0.0, 1) > 1e-3
+    assert stability_cases.spin_drift(2 * np.pi / 2000, 0.5, 1) > 1e-9
+
+
+def test_edge_of_what_has_no_limit_there():
+    assert math.isnan(limits.edge(lambda x: False, 1.0))
+    assert math.isnan(limits.edge(lambda x: True, 1.0))
+    assert limits.edge(lambda x: x > 1.01, 1.0) == pytest.approx(1.01, rel=1e-3)
+
+
+def test_a_wrong_limit_is_off():
+    wrong = limits.Limit("1", "wrong", "x", 1.0, lambda x: x > 1.05)
+    assert stability.limit_row(wrong)[-1] == "off"
+    assert stability.value_row(limits.Value("1", "wrong", "x", 1.0, 1.1, 0.05))[-1] == "off"
+
+
+def test_map_agrees_with_runs():
+    for reaction, order in stability_map.MODES:
+        for ratio, step in ((0.1, 0.3), (30.0, 0.3), (0.3, 0.05)):
+            point = stability_map.point(reaction, order, ratio, step, run=True)
+            assert (point.growth > limits.GROWS) != point.stable
+    full = [stability_map.point("full", 0, ratio, 0.1, run=False) for ratio in (0.98, 1.02)]
+    assert full[0].stable and not full[1].stable
+
+
+def test_study_writes_everything_and_repeats(tmp_path, capsys, monkeypatch):
+    """On every sixth limit, which is quicker; the limits themselves are tested above."""
+    some = LIMITS[::6] + LIMITS[-1:]
+    monkeypatch.setattr(stability_cases, "limits", lambda: some)
+    monkeypatch.setattr(stability_cases, "VALUES", [stability_cases.split_values, stability_cases.clamp_values])
+    written = []
+    for name in ("a", "b"):
+        options = argparse.ArgumentParser()
+        stability.add_parser(options.add_subparsers())
+        options = options.parse_args(["stability", "--out", str(tmp_path / name), "--grid", "4"])
+        assert options.command(options) == 0
+        written.append({path.name: path.read_bytes() for path in (tmp_path / name).iterdir()
+                        if path.suffix in (".csv", ".html")})
+    assert written[0] == written[1]
+    names = {path.name for path in (tmp_path / "a").iterdir()}
+    assert names == {"stability_limits.csv", "stability_values.csv", "stability_map.csv", "stability.html",
+                     *(f"stability_{chart}.{kind}" for chart in ("limits", "map") for kind in ("png", "svg"))}
+    rows = list(csv.DictReader(written[0]["stability_limits.csv"].decode().splitlines()))
+    assert len(rows) == len(some) and {row["status"] for row in rows} == {"ok"}
+    assert "8. outside the segment" in capsys.readouterr().out
