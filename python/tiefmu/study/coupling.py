@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from .. import schema
-from .._core import SceneError
+from .._core import Diverged, SceneError
 from ..scene import Scene
 from . import page
 from .hosts import EXTRAPOLATIONS, Coupling, InProcess, Masses, Packaged
@@ -67,7 +67,10 @@ def add_parser(studies):
 
 
 def positive(text: str) -> float:
-    value = float(text)
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
     if not 0 < value < math.inf:
         raise argparse.ArgumentTypeError(f"'{text}' is not a positive number")
     return value
@@ -141,9 +144,10 @@ class Study:
         if mass_ratio and not tie.own[:n].all():  # no masses to scale: equal ones
             tie.own[:n], host_mass = self.tied / (mass_ratio * n / 3), self.tied / mass_ratio
         for k in np.flatnonzero(tie.own <= 0):
-            what, masters = ("mass", tie.names.driven) if k < n else ("inertia", tie.names.turning)
-            raise SceneError(f"{path}: master[{masters[(k if k < n else k - n) // 3]}] has no {what} of its own, which a "
-                             f"host needs; give {what} in a [[node]] table"
+            place = k // 3 if k < n else tie.names.driven.index(tie.names.turning[(k - n) // 3])
+            what = "mass" if k < n else "inertia"
+            raise SceneError(f"{path}: master {tie.node_ids[place]}: has no {what} of its own, which a host needs; "
+                             f"give {what} in a [[node]] table"
                              + (", or --mass-ratio" if what == "mass" else ""))
         self.own = tie.own * (self.tied / (mass_ratio * host_mass) if mass_ratio and self.tied > 0 else 1.0)
         self.ratio = self.tied / float(self.own[:n:3].sum())
@@ -222,7 +226,7 @@ class Study:
         run = self.simulate(tie, host, size, order, count)
         if run is None:
             return row
-        velocity, load, residual, row.cpu = run
+        velocity, load, residual, cpu = run
         times = np.arange(count + 1) * size
         exact_velocity, exact_load, exact_power = (reference.at(times, key) for key in ("velocity", "load", "power"))
         if not relative(velocity, exact_velocity) < 10:
@@ -231,7 +235,7 @@ class Study:
         row.error_final = relative(velocity[-1:], exact_velocity[-1:])
         row.power_residual = float(np.sqrt(np.mean(residual[1:]**2)))
         row.power_residual_relative = row.power_residual / reference.power_rms
-        row.status = "stable" if radius <= GROWS else "unstable"
+        row.cpu, row.status = cpu, "stable" if radius <= GROWS else "unstable"
         return row
 
     def rate(self, probe: Coupling) -> float:
@@ -244,8 +248,8 @@ class Study:
         return probe.radius()
 
     def simulate(self, tie: Packaged, host: Masses, size: float, order: int, count: int):
-        """(slave velocities, loads of the tie on the masters, power residuals) at the communication points, and CPU s per
-        s; or None where it diverges."""
+        """(slave velocities, loads of the tie on the masters, power residuals) at the communication points, and CPU s
+        per s; or None where it diverges."""
         tie.restart()
         coupling = Coupling(tie, host, size, order)
         state, used = coupling.rest(), None
@@ -266,7 +270,10 @@ class Study:
             following, used = coupling.advance(state, answer)
             if not abs(following[1]).max() < bound:
                 return None
-            tie.carry((state[1] + following[1]) / 2, n * size, size)
+            try:
+                tie.carry((state[1] + following[1]) / 2, n * size, size)
+            except Diverged:
+                return None
             state = following
         return velocity, load, residual, (time.process_time() - start) / self.window
 
@@ -410,9 +417,9 @@ def draw(rows: list[Row], folder: Path, name: str) -> Path:
 
 INTRO = [
     "The packaged FMU runs under FMPy; the other side is a host in NumPy that carries the driven masters as point "
-    f"masses. They stand on ground springs of {OMEGA:g} rad/s (or of the highest frequency of the scene's own springs) with "
-    f"{100 * ZETA:g} % damping, unless the host is rigid. Between communication points it solves its own equations "
-    "exactly under the tie's last load - held, or extrapolated linearly or quadratically - so the error is that of the "
+    f"masses. They stand on ground springs of {OMEGA:g} rad/s (or of the highest frequency of the scene's own springs) "
+    f"with {100 * ZETA:g} % damping, unless the host is rigid. Between communication points it solves its own "
+    "equations exactly under the tie's last load - held, or extrapolated linearly or quadratically - so the error is that of the "
     "coupling. Smooth pulses act on the slaves; the exact solution is the monolithic system.",
     "'loads' is lumped, so its error cannot fall below that of lumping. 'spring-damper' exchanges a force: the slaves "
     "weigh nothing and hang on springs and dampers inside the FMU. The power residual is sum f.v at a communication "

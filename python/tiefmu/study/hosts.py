@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .. import package
-from .._core import SceneError
+from .._core import Diverged, SceneError
 from ..scene import MOTIONS, Scene
 
 EXTRAPOLATIONS = ["held", "linear", "quadratic"]  # by order
@@ -135,6 +135,7 @@ class Packaged(Tie):
         import fmpy  # here, because importing it takes half a second
         import fmpy.fmi2
 
+        self.failed = fmpy.fmi1.FMICallException
         self.folder = tempfile.TemporaryDirectory(prefix="tiefmu-")
         path = package.build(scene, f"{self.folder.name}/scene.fmu")
         description = fmpy.read_model_description(str(path), validate=False)
@@ -189,7 +190,10 @@ class Packaged(Tie):
         return self.slave.copy()
 
     def step(self, time, size):
-        self.fmu.fmi2DoStep(self.fmu.component, time, size, 1)
+        try:
+            self.fmu.fmi2DoStep(self.fmu.component, time, size, 1)
+        except self.failed as error:
+            raise Diverged(f"the FMU stopped at t = {time:g} s") from error
 
 
 def exponential(matrix: np.ndarray) -> np.ndarray:
@@ -309,7 +313,10 @@ class Coupling:
         for k in range(steps):
             following = self.advance(state, self.load(state) - still)[0]
             if self.tie.keeps_state:
-                self.tie.carry((state[1] + following[1]) / 2, k * self.size, self.size)
+                try:
+                    self.tie.carry((state[1] + following[1]) / 2, k * self.size, self.size)
+                except Diverged:
+                    return float(np.inf)
             state = following
             size = np.abs(state[2]).max()
             if not size < 1e200:

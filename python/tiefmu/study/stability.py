@@ -5,6 +5,7 @@ import math
 from dataclasses import asdict
 from pathlib import Path
 
+from .._core import SceneError
 from . import page, stability_cases, stability_map
 from .limits import GROWS, Limit, Value, edge
 
@@ -19,7 +20,7 @@ def add_parser(studies):
                                "their closed forms. Exit status 1 if one is off.")
     study.add_argument("--out", metavar="DIR", type=Path, default=Path("out/study"),
                        help="folder to write to (default: out/study)")
-    study.add_argument("--grid", metavar="N", type=int, default=32, choices=range(4, 201),
+    study.add_argument("--grid", metavar="N", type=int, default=32,
                        help="points per axis of the map, 4 to 200 (default: 32)")
     study.set_defaults(command=run)
 
@@ -27,6 +28,8 @@ def add_parser(studies):
 def run(options) -> int:
     from tqdm import tqdm
 
+    if not 4 <= options.grid <= 200:
+        raise SceneError(f"--grid: expected 4 to 200 points, found {options.grid}")
     options.out.mkdir(parents=True, exist_ok=True)
     limits, values, points = stability_cases.limits(), [], []
     limit_table, value_table = [], []
@@ -137,6 +140,6 @@ def write_page(path: Path, limit_table: list, value_table: list, points: list, f
             f"{len(both)}, {agreeing(both)} agree with the eigenvalues.",
             "'loads' is always stable, and as wrong as its lumping. 'full' ends at r = 1 whatever the step. 'split' "
             "survives every ratio as the step goes to zero; at finite steps the held load lags behind the host's "
-            "springs, which feeds energy in, and the host's damping has to outweigh it: H omega < 2 zeta (1 + r)/(r (r + "
-            "1/2)). Linear extrapolation moves that limit far up."],
+            "springs, which feeds energy in, and the host's damping has to outweigh it: H omega < 2 zeta (1 + r)/(r (r "
+            "+ 1/2)). Linear extrapolation moves that limit far up."],
             [("Stability and accuracy over mass ratio and communication step.", figures[1])])])
