@@ -51,13 +51,16 @@ double stableStep(Method method, double omega, double c) {
   if (!(omega > 0) && !(c > 0)) return none;
   if (method == Method::centralDifference || method == Method::symplecticEuler)
     return 4 / (c + std::sqrt(c * c + 4 * omega * omega));  // = 2/omega (sqrt(1 + z^2) - z), also for omega = 0
+  // Without units: in s and m/s^2 the entries of a step's matrix are many decades apart, and its eigenvalues are lost.
+  const double scale = 1 / std::max(omega, c);
+  omega *= scale;
+  c *= scale;
   const auto stable = [&](double h) {
     const double radius = method == Method::rk4 ? rk4Radius(h, omega, c) : nohBatheRadius(h, omega, c);
     return radius <= 1 + 1e-10;
   };
-  const double scale = 1 / std::max(omega, c);
-  double low = 0, high = 8 * scale;
-  for (double h = 0.02 * scale; h < high; h += 0.02 * scale) {
+  double low = 0, high = 8;
+  for (double h = 0.02; h < high; h += 0.02) {
     if (!stable(h)) {
       high = h;
       break;
@@ -65,7 +68,7 @@ double stableStep(Method method, double omega, double c) {
     low = h;
   }
   for (int i = 0; i < 60; ++i) (stable(0.5 * (low + high)) ? low : high) = 0.5 * (low + high);
-  return low;
+  return low * scale;
 }
 
 double nodalStep(const Model& model, const double* addedMass, const double* addedInertia, const double* stiffness,
