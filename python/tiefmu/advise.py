@@ -85,7 +85,9 @@ class Advice:
         if c.variant.freedoms != "all":
             lines.append(f"freedoms: translations only; model error {error_text(errors[c.variant])}")
         elif len(source.scene.rotations):
-            lines.append(f"freedoms: all; without the rotations of the masters the error is {instead(dropped)}")
+            without = (f"the error is {instead(dropped)}" if dropped in errors else
+                       "the springs and slaves that need them have no model")
+            lines.append(f"freedoms: all; without the rotations of the masters {without}")
         else:
             lines.append("freedoms: all (translations only; there are no rotations to leave out)")
         for key, cheap, costly in (("inertia", "lumped", "consistent"), ("geometry", "small", "finite")):

@@ -1,7 +1,6 @@
 """Studies: speed against accuracy, coupling to a host, stability. One module each, with charts, tables and a page."""
 
-import importlib
-from importlib.util import find_spec
+from . import coupling, speed_accuracy, stability
 
 
 def add_parser(commands):
@@ -10,6 +9,5 @@ def add_parser(commands):
                                 description="Measures speed against accuracy, coupling and stability; writes CSV, "
                                 "charts and a page.")
     studies = study.add_subparsers(required=True, metavar="STUDY")
-    for name in ("speed_accuracy", "coupling", "stability"):
-        if find_spec(f"{__name__}.{name}"):
-            importlib.import_module(f".{name}", __name__).add_parser(studies)
+    for module in (speed_accuracy, coupling, stability):
+        module.add_parser(studies)

@@ -13,8 +13,8 @@ import numpy as np
 from .._core import SceneError
 from ..scene import Scene
 
-REPEATS = 5
-SHORTEST = 0.01   # s of CPU time that one measurement takes at least
+REPEATS = 3
+SHORTEST = 0.005  # s of CPU time that one measurement takes at least
 LONGEST = 0.3     # s after which a measurement is not repeated
 
 
@@ -233,7 +233,7 @@ def measured(prepare, once, simulation, duration: float) -> tuple[float, float]:
     times = []
     while len(times) < REPEATS and sum(times) < LONGEST:
         count, total = 0, 0.0
-        while total < SHORTEST:
+        while not count or total < SHORTEST:
             prepare()
             began = time.process_time()
             once()

@@ -57,7 +57,8 @@ def add_parser(studies):
         "penalty ties, over a ladder of steps; writes DIR/speed-accuracy-NAME.csv, .svg and .png, and the page "
         "DIR/speed-accuracy.html of all scenes studied there. Ctrl-C leaves the rows finished so far.")
     parser.add_argument("scenes", metavar="SCENE", nargs="+", help="scene file (TOML)")
-    parser.add_argument("--out", metavar="DIR", type=Path, default=Path("out"), help="folder to write to (default: out)")
+    parser.add_argument("--out", metavar="DIR", type=Path, default=Path("out/study"),
+                        help="folder to write to (default: out/study)")
     parser.add_argument("--input", metavar="CSV", type=Path,
                         help="inputs over time, as for `tiefmu run` (default: NAME.csv beside NAME.toml, if there)")
     parser.add_argument("--ladder", metavar="N", type=rungs, default=STEPS,

@@ -1,0 +1,200 @@
+"""`tiefmu advise` on every example scene: what it says is run again from the scene it wrote, and its error found anew."""
+
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import tiefmu
+from conftest import toml
+from tiefmu import advise as advising
+from tiefmu.cli import main
+from tiefmu.study import motion, speed_accuracy
+from tiefmu.study.motion import Signals
+from tiefmu.study.variants import Source
+
+SCENES = sorted((Path(__file__).parents[1] / "scenes").glob("*.toml"))
+TOLERANCE = 3e-3
+FINER = 16  # how much finer than its stability limit the fresh reference of a free scene steps
+
+
+@pytest.fixture(autouse=True)
+def short_times(monkeypatch):
+    monkeypatch.setattr(motion, "REPEATS", 1)
+    monkeypatch.setattr(motion, "SHORTEST", 0.0)
+    monkeypatch.setattr(speed_accuracy, "HORIZON", 20)
+
+
+def relative(x, exact):
+    return np.linalg.norm(x - exact) / np.linalg.norm(exact)
+
+
+class Given:
+    """The input CSV by columns, read here."""
+
+    def __init__(self, path):
+        lines = path.read_text().splitlines() if path and path.is_file() else ["time", "0"]
+        self.names = lines[0].split(",")[1:]
+        table = np.array([[float(x) for x in line.split(",")] for line in lines[1:]])
+        self.time, self.columns = table[:, 0], table[:, 1:]
+
+    def at(self, t):
+        return np.array([np.interp(t, self.time, column) for column in self.columns.T])
+
+    def mean(self, a, b):
+        knots = np.concatenate([[a], self.time[(self.time > a) & (self.time < b)], [b]])
+        values = np.array([self.at(t) for t in knots])
+        return np.trapezoid(values, knots, axis=0) / (b - a) if hasattr(np, "trapezoid") else \
+            np.trapz(values, knots, axis=0) / (b - a)
+
+
+def written(path, new, **changes):
+    """The advised scene with more changes, as a dict that finds its mesh."""
+    raw = tomllib.loads(new.read_text())
+    if "file" in raw["mesh"]:
+        raw["mesh"]["file"] = str((new.parent / raw["mesh"]["file"]).resolve())
+    for key, value in changes.items():
+        table, name = key.split("__")
+        raw.setdefault(table, {})[name] = value
+    return tiefmu.load(raw)
+
+
+def slave_velocities(scene, given, edges):
+    """At the end of each interval of constant mean inputs."""
+    simulation = scene.simulation()
+    simulation.initialise(0.0)
+    result = []
+    for a, b in zip(edges[:-1], edges[1:]):
+        if given.names:
+            simulation.set_values(given.names, given.mean(a, b))
+        simulation.step(b - a)
+        result.append(simulation.get("slave_velocity"))
+    return np.array(result)
+
+
+def check_free(path, new, advice):
+    source = Source(path)
+    edges = speed_accuracy.intervals(source, Signals.read(source.scene, speed_accuracy.inputs_beside(path)))
+    given, scene = Given(path.with_suffix(".csv")), written(path, new)
+    assert advice.choice.step <= advising.SAFETY * scene.start.integrator_limit * (1 + 1e-9)
+    limit = scene.start.get("stable_time_step")[0]
+    exact = slave_velocities(written(path, new, model__inertia="consistent", model__geometry="finite",
+                                     integrator__method="rk4", integrator__time_step=limit / FINER / scene_time(new)),
+                             given, edges)
+    error = relative(slave_velocities(scene, given, edges), exact)
+    assert error <= 1.02 * TOLERANCE
+    assert error == pytest.approx(advice.choice.error_v, rel=0.05)
+
+
+def scene_time(new) -> float:
+    return {"s": 1.0, "ms": 1e-3}[tomllib.loads(new.read_text()).get("units", {}).get("time", "s")]
+
+
+def play_host(scene, given, end, steps, middle, reaction):
+    """Steps of equal length; at 40 times the slaves' velocities and all of the tie's load on the masters."""
+    simulation = scene.simulation()
+    simulation.initialise(0.0)
+    speeds = [k for k, name in enumerate(given.names) if name.split(".")[1][0] in "vw"]
+    loads = [k for k, name in enumerate(given.names) if name.split(".")[1][0] in "ft"]
+    names = [given.names[k] for k in speeds]
+    rates = [name.replace(".v[", ".a[").replace(".w[", ".z[") for name in names]
+    other, h = [given.names[k] for k in loads], end / steps
+    added = scene.start.get("added_mass")[:, None]
+    nodes = {int(i): k for k, i in enumerate(scene.model.report()["nodes"]["id"])}
+    ids = {f"master[{n}]": int(i) for block in simulation.variables if block["name"] == "master.f"
+           for n, i in zip(block["numbers"], block["ids"])}
+    v, f = [], []
+    for k in range(steps):
+        simulation.set_values(names, given.at((k + (0.5 if middle else 0)) * h)[speeds])
+        simulation.step(h)
+        if (k + 1) % (steps // 40):
+            continue
+        t = (k + 1) * h
+        row = int(np.searchsorted(given.time, t * (1 - 1e-12)))  # the slope before t
+        slope = (given.columns[row] - given.columns[row - 1]) / (given.time[row] - given.time[row - 1])
+        simulation.set_values(names, given.at(t)[speeds])
+        simulation.set_values(other, given.at(t)[loads])
+        if reaction != "loads":
+            simulation.set_values(rates, slope[speeds])
+        a = np.zeros((len(nodes), 3))
+        for name, rate in zip(names, slope[speeds]):
+            if ".v[" in name:
+                a[nodes[ids[name.split(".")[0]]], int(name[-2]) - 1] = rate
+        v.append(simulation.get("slave_velocity"))
+        f.append(simulation.get("reaction_force") - (0 if reaction == "full" else added * a))
+    return np.array(v), np.array(f)
+
+
+def check_driven(path, new, advice):
+    given, scene = Given(path.with_suffix(".csv")), written(path, new)
+    given.columns = given.columns[:, keep := [k for k, name in enumerate(given.names)
+                                              if name.split(".")[1][0] not in "az"]]
+    given.names = [given.names[k] for k in keep]
+    end, steps = given.time[-1], round(given.time[-1] / advice.choice.step)
+    reaction = tomllib.loads(new.read_text())["model"]["reaction"]
+    assert reaction == advice.choice.reaction and reaction != "full"
+    exact = play_host(written(path, new, model__inertia="consistent", model__geometry="finite",
+                              model__reaction="full"), given, end, 8 * len(given.time) // 40 * 40, True, "full")
+    now = play_host(scene, given, end, steps, advice.choice.method == "midpoint input", reaction)
+    errors = [relative(x, y) for x, y in zip(now, exact)]
+    assert max(errors) <= 1.02 * TOLERANCE
+    assert max(errors) == pytest.approx(advice.choice.error, rel=0.05, abs=1e-6)
+
+
+@pytest.mark.parametrize("path", SCENES, ids=lambda path: path.stem)
+def test_the_advised_scene_keeps_the_tolerance(path, tmp_path, capsys, monkeypatch):
+    found = []
+    original = advising.advise
+    monkeypatch.setattr(advising, "advise", lambda *arguments: found.append(original(*arguments)) or found[0])
+    new = tmp_path / "new.toml"
+    assert main(["advise", str(path), "--tolerance", str(TOLERANCE), "--write", str(new)]) == 0
+    said = capsys.readouterr().out
+    for line in ("freedoms: ", "inertia: ", "geometry: ", "integrator: "):
+        assert said.count(f"\n{line}") == 1
+    assert ("\nreaction: " in said) == Source(path).any_driven
+    (check_free if Source(path).any_free else check_driven)(path, new, found[0])
+
+
+def test_full_is_refused_for_the_heavy_slave(capsys):
+    path = next(path for path in SCENES if path.stem == "heavy_slave")
+    assert main(["advise", str(path)]) == 0
+    said = capsys.readouterr().out
+    assert "full is refused" in said and "r = 24.7" in said and "reaction: split" in said
+
+
+def test_mass_ratio_is_that_of_theory(tmp_path):
+    """One slave m at the centre of four masters M, no offset: T^T m T / M has the eigenvalue m/(4 M)."""
+    scene = {"mesh": {"nodes": [[1, 0, 0, 0], [2, 1, 0, 0], [3, 1, 1, 0], [4, 0, 1, 0], [101, 0.5, 0.5, 0]],
+                      "segments": [[1, 1, 2, 3, 4]]},
+             "node": [{"nodes": "all", "mass": 2.0}, {"nodes": [101], "mass": 6.0}],
+             "tie": [{"segments": "all", "slaves": [101]}]}
+    (tmp_path / "a.toml").write_text(toml(scene))
+    assert advising.mass_ratio(Source(tmp_path / "a.toml")) == pytest.approx(6 / 8, rel=1e-12)
+    scene["node"][0]["mass"] = 0.0
+    (tmp_path / "a.toml").write_text(toml(scene))
+    assert advising.mass_ratio(Source(tmp_path / "a.toml")) == np.inf
+
+
+def test_a_larger_step_than_advised_breaks_the_tolerance():
+    """Control: the next larger step that was tried is not good enough, or is past the safety of the limit."""
+    path = next(path for path in SCENES if path.stem == "spinning")
+    advice = advising.advise(Source(path), None, TOLERANCE)
+    step, error = advice.choice.coarser
+    assert step > advice.choice.step and error > TOLERANCE
+
+
+def test_bad_input_is_one_line(tmp_path, capsys):
+    rivet = next(path for path in SCENES if path.stem == "rivet")
+    undriven = tmp_path / "undriven.toml"
+    undriven.write_text(next(path for path in SCENES if path.stem == "heavy_slave").read_text())
+    for arguments, said in [(["nosuch.toml"], "nosuch.toml: no such file"),
+                            ([rivet, "--tolerance", "1e-15"], "out of reach"),
+                            ([undriven], "every master is driven and there is no input"),
+                            ([rivet, "--write", tmp_path / "no" / "new.toml"], "does not exist")]:
+        assert main(["advise", *map(str, arguments)]) == 2
+        error = capsys.readouterr().err
+        assert said in error and error.startswith("error: ") and error.count("\n") == 1
+    with pytest.raises(SystemExit) as stop:
+        main(["advise", str(rivet), "--tolerance", "-1"])
+    assert stop.value.code == 2
