@@ -10,7 +10,7 @@ from .limits import GROWS, coupled, plate
 ZETA = 0.02  # of the host's masters on their springs
 MODES = [("loads", 0), ("full", 0), ("split", 0), ("split", 1)]  # reaction, order of the extrapolation
 CLASSES = [1e-3, 1e-2, 1e-1]  # upper ends of the classes of error; beyond the last one, and unstable
-MAX_STEPS = 6000  # of a run
+MAX_STEPS = 12000  # of a run
 EVERY = 4  # how many grid lines lie between the points that are also decided by a run
 
 
@@ -46,9 +46,9 @@ def point(reaction: str, order: int, ratio: float, step: float, run: bool) -> Po
 
 
 def grown(coupling, period: float) -> float:
-    """Growth per step over eight of the slowest periods (each so many steps); NaN where those are too many steps and
+    """Growth per step over 24 of the slowest periods (each so many steps); NaN where those are too many steps and
     the run has not made itself plain before."""
-    wanted = int(np.ceil(8 * period))
+    wanted = int(np.ceil(24 * period))
     steps = min(wanted, MAX_STEPS)
     growth = coupling.growth(steps)
     return growth if steps == wanted or growth ** (steps / 2) > 1e3 else float("nan")
