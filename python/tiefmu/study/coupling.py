@@ -419,8 +419,8 @@ INTRO = [
     "The packaged FMU runs under FMPy; the other side is a host in NumPy that carries the driven masters as point "
     f"masses. They stand on ground springs of {OMEGA:g} rad/s (or of the highest frequency of the scene's own springs) "
     f"with {100 * ZETA:g} % damping, unless the host is rigid. Between communication points it solves its own "
-    "equations exactly under the tie's last load - held, or extrapolated linearly or quadratically - so the error is that "
-    "of the coupling. Smooth pulses act on the slaves; the exact solution is the monolithic system.",
+    "equations exactly under the tie's last load - held, or extrapolated linearly or quadratically - so the error is "
+    "that of the coupling. Smooth pulses act on the slaves; the exact solution is the monolithic system.",
     "'loads' is lumped, so its error cannot fall below that of lumping. 'spring-damper' exchanges a force: the slaves "
     "weigh nothing and hang on springs and dampers inside the FMU. The power residual is sum f.v at a communication "
     "point with the load that the host has used, minus with the load that the tie answers there."]
