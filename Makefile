@@ -1,5 +1,7 @@
 # make demo   set everything up, build the example scenes as FMUs, run them, write out/
-# make test   set everything up, run all tests
+# make test   set everything up, with the tools below, run all tests
+# make tools  install other people's tools that the tests run FMUs in
+# make study  measure speed, accuracy and stability, write charts and tables to docs/study/
 # make bench  time the kernels and the FMU calls, write bench/latest.csv
 PYTHON ?= python3
 VENV := .venv
@@ -7,16 +9,21 @@ BIN := $(VENV)/bin
 REQUIRES = $(shell sed -n 's/^requires = \[\(.*\)\]/\1/p' pyproject.toml | sed 's/", /" /g')
 SOURCES := CMakeLists.txt $(wildcard src/*.?pp modelDescription/*.?pp fmu/*.?pp python/bindings/*.?pp)
 
-# Other people's tools that the tests run FMUs in, each set in an environment of its own. Not compiled ahead: most of
-# their files are never imported.
+# Each set in an environment of its own; not compiled ahead, as most of their files are never imported.
 TOOLS := build/tools/importers/installed build/tools/cofmupy/installed
 
-.PHONY: demo test tools bench clean
+.PHONY: demo test tools study bench clean
 demo: $(VENV)/installed
 	$(BIN)/tiefmu demo --out out
 
 test: $(VENV)/installed tools
 	$(BIN)/python -m pytest -n 2
+
+study: $(VENV)/installed
+	$(BIN)/tiefmu study speed-accuracy scenes/*.toml --out docs/study
+	$(BIN)/tiefmu study coupling scenes/heavy_slave.toml scenes/spotweld.toml --out docs/study
+	$(BIN)/tiefmu study stability --out docs/study
+	cp docs/study/speed-accuracy-bracket.svg docs/speed-accuracy.svg
 
 bench: $(VENV)/installed
 	$(BIN)/python bench/run.py

@@ -7,8 +7,7 @@ import zipfile
 import numpy as np
 import pytest
 
-from test_tools_importers import same_bits
-from tool_cases import EXAMPLE, NODES, STEP, build, call, plain, program, tie_case
+from tool_cases import EXAMPLE, NODES, STEP, build, call, plain, program, same_bits, tie_case
 
 MOVED = [f"master[{i}].v[{k}]" for i, k in NODES]
 ANSWERS = [f"master[{i}].f[{k}]" for i, k in NODES] + [f"slave[1].v[{k}]" for k in (1, 2, 3)]

@@ -11,8 +11,7 @@ from fmpy import fmi2
 from fmpy.util import write_csv
 from fmpy.validation import validate_fmu
 
-from test_tools_importers import same_bits
-from tool_cases import EXAMPLE, STEP, build, call, plain, tie_case
+from tool_cases import CALLBACKS, EXAMPLE, STEP, build, call, plain, same_bits, tie_case
 
 STEPS = 120
 OUTPUTS = [f"master[{i}].f[{k}]" for i in range(1, 5) for k in (1, 2, 3)] + ["slave[1].v[1]", "slave[1].v[3]"]
@@ -55,11 +54,11 @@ def simulate(case, **options) -> np.ndarray:
     return np.transpose([rows[name] for name in OUTPUTS])
 
 
-def instantiated(tie, **arguments) -> fmi2.FMU2Slave:
+def instantiated(tie) -> fmi2.FMU2Slave:
     description = fmpy.read_model_description(tie)
     instance = fmi2.FMU2Slave(guid=description.guid, unzipDirectory=fmpy.extract(tie), instanceName="tie",
-                              modelIdentifier=description.coSimulation.modelIdentifier, **arguments)
-    instance.instantiate()
+                              modelIdentifier=description.coSimulation.modelIdentifier)
+    instance.instantiate(callbacks=CALLBACKS)
     return instance
 
 
@@ -167,9 +166,9 @@ def cross_check(case, sign: float, folder) -> list[str]:
     (place / "tie_ref.opt").write_text(f"StartTime, 0.0\nStopTime, {STEPS * STEP}\nStepSize, {STEP}\nRelTol, 1e-6\n")
     write_csv(place / "tie_in.csv", signals(inputs))
     write_csv(place / "tie_ref.csv", reference)
-    call(sys.executable, "-m", "fmpy.cross_check", "--fmus_dir", folder, "--report", folder / "report.html", "--simulate",
-         cwd=folder)
-    cells = re.findall(r'label label-(\w+)"[^>]*>([^<]*)<', (folder / "report.html").read_text())
+    report = folder / "report.html"
+    call(sys.executable, "-m", "fmpy.cross_check", "--fmus_dir", folder, "--report", report, "--simulate", cwd=folder)
+    cells = re.findall(r'label label-(\w+)"[^>]*>([^<]*)<', report.read_text())
     assert len(cells) == 7
     del cells[4]  # of the documentation
     return [word for word, _ in cells]

@@ -6,7 +6,7 @@ Values are compared, never exit statuses: some importers report an FMU that they
 import numpy as np
 import pytest
 
-from tool_cases import build, coupled_case, plain, python_host, run_tool, tie_case
+from tool_cases import build, coupled_case, plain, python_host, run_tool, same_bits, tie_case
 
 # When each passes values on and reads them; what it does is documented nowhere but in its answers.
 ORDER = {
@@ -25,13 +25,6 @@ def folder(tmp_path_factory):
 @pytest.fixture(scope="module")
 def tie(folder) -> str:
     return build("tie", folder)
-
-
-def same_bits(found: dict, expected: dict):
-    assert found.keys() == expected.keys()
-    for name, values in expected.items():
-        assert np.ptp(values, axis=0).min() > 0  # every output moves, so that zeros cannot pass
-        np.testing.assert_array_equal(found[name], values, err_msg=name)
 
 
 @pytest.mark.parametrize("tool", ORDER)

@@ -8,8 +8,7 @@ import pytest
 from fmpy.ssp.simulation import simulate_ssp
 from fmpy.ssp.ssd import get_connections, read_ssd
 
-from test_tools_importers import same_bits
-from tool_cases import EXAMPLE, call, coupled_case, plain, program, run_tool
+from tool_cases import EXAMPLE, call, coupled_case, plain, program, run_tool, same_bits
 
 specification = importlib.util.spec_from_file_location("build_ssp", EXAMPLE / "build_ssp.py")
 build_ssp = importlib.util.module_from_spec(specification)

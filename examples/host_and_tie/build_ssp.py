@@ -52,7 +52,8 @@ def structure(descriptions) -> str:
               f' endElement="{target}" endConnector={quoteattr(there)}/>'
               for source, here, target, there in connections(descriptions)]
     lines += ['    </ssd:Connections>', '  </ssd:System>',
-              f'  <ssd:DefaultExperiment startTime="0" stopTime="{STOP_TIME}"/>', '</ssd:SystemStructureDescription>', '']
+              f'  <ssd:DefaultExperiment startTime="0" stopTime="{STOP_TIME}"/>',
+              '</ssd:SystemStructureDescription>', '']
     return "\n".join(lines)
 
 
