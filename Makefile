@@ -2,7 +2,6 @@
 # make test   set everything up, with the tools below, run all tests
 # make tools  install other people's tools that the tests run FMUs in
 # make study  measure speed, accuracy and stability, write charts and tables to docs/study/
-# make study  measure speed, accuracy and stability, write charts and tables to docs/study/
 # make bench  time the kernels and the FMU calls, write bench/latest.csv
 PYTHON ?= python3
 VENV := .venv
@@ -19,12 +18,6 @@ demo: $(VENV)/installed
 
 test: $(VENV)/installed tools
 	$(BIN)/python -m pytest -n 2
-
-study: $(VENV)/installed
-	$(BIN)/tiefmu study speed-accuracy scenes/*.toml --out docs/study
-	$(BIN)/tiefmu study coupling scenes/heavy_slave.toml scenes/spotweld.toml --out docs/study
-	$(BIN)/tiefmu study stability --out docs/study
-	cp docs/study/speed-accuracy-bracket.svg docs/speed-accuracy.svg
 
 study: $(VENV)/installed
 	$(BIN)/tiefmu study speed-accuracy scenes/*.toml --out docs/study
