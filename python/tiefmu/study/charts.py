@@ -12,6 +12,8 @@ COLOURS = {"central-difference": "#0072B2", "symplectic-euler": "#E69F00", "noh-
            "held input": "#0072B2", "midpoint input": "#D55E00"}
 MARKERS = {"central-difference": "o", "symplectic-euler": "s", "noh-bathe": "^", "rk4": "D", "held input": "o",
            "midpoint input": "D"}
+# Curves that often lie on one another keep visible: the lower one is drawn broader.
+SIZES = {method: 4.5 for method in MARKERS} | {"symplectic-euler": 7.5, "central-difference": 4}
 LINES = {"consistent": "-", "lumped": "--"}
 HOW_TO_READ = [
     "Each point is one run. Down is more accurate, left is cheaper: of two curves the lower left one is the better "
@@ -50,10 +52,14 @@ def panel(axis, rows: list[Row], x: str, y: str):
         penalty, lumped = points[0].penalty, points[0].inertia == "lumped"
         style = ":" if penalty else LINES[points[0].inertia]
         axis.plot([getattr(row, x) for row in points], [max(getattr(row, y), 1e-16) for row in points], style,
-                  color=COLOURS[method], marker=MARKERS[method], markersize=4.5 if penalty != 1 else 3,
+                  color=COLOURS[method], marker=MARKERS[method], markersize=SIZES[method] - (1.5 if penalty == 1 else 0),
                   markerfacecolor="white" if lumped or penalty else COLOURS[method],
-                  linewidth=1.0 if penalty else 1.5, alpha=0.6 if penalty else 1.0)
+                  linewidth=1.0 if penalty else SIZES[method] / 3, alpha=0.6 if penalty else 1.0,
+                  zorder=2 + 1 / SIZES[method])
     axis.set(xscale="log", yscale="log")
+    if axis.get_ylim()[1] < 1e-12:
+        axis.set_ylim(1e-16, 1)
+        axis.text(0.5, 0.5, "exact to rounding", transform=axis.transAxes, ha="center", color="#555")
     decades(axis.xaxis)
     axis.grid(alpha=0.25, which="major")
 
@@ -92,6 +98,7 @@ def legend(figure, rows: list[Row]):
 
 
 V, F = "error of slave velocities [-]", "error of loads on masters [-]"
+LABELS = {"error_v": V, "error_f": F}
 CPU, EVALUATIONS = "CPU time per simulated second [s/s]", "force evaluations per simulated second [1/s]"
 
 
@@ -103,9 +110,11 @@ def main_figure(rows: list[Row]):
     figure, axes = plt.subplots(2, 2, figsize=(11, 8.4), layout="constrained")
     evaluations = "communication steps per simulated second [1/s]" if driven else EVALUATIONS
     over = "step" if driven else "step_over_limit"
+    first, second = ("error_f", "error_v") if driven else ("error_v", "error_f")  # given motions are hardly wrong
     for axis, x, y, xlabel, ylabel in [
-            (axes[0, 0], "cpu_s_per_s", "error_v", CPU, V), (axes[0, 1], "evaluations_per_s", "error_v", evaluations, V),
-            (axes[1, 0], "evaluations_per_s", "error_f", evaluations, F),
+            (axes[0, 0], "cpu_s_per_s", first, CPU, LABELS[first]),
+            (axes[0, 1], "evaluations_per_s", first, evaluations, LABELS[first]),
+            (axes[1, 0], "evaluations_per_s", second, evaluations, LABELS[second]),
             (axes[1, 1], over, "discretisation_f" if driven else "discretisation_v",
              "communication step [s]" if driven else "step / stability limit of the method [-]",
              "discretisation error alone, " + ("loads [-]" if driven else "velocities [-]"))]:
@@ -114,7 +123,7 @@ def main_figure(rows: list[Row]):
     if not driven:
         crosses(axes[1, 1], own)
     for axis in axes.flat[:3]:  # lumping: the level that no step goes below
-        column = "model_f" if axis is axes[1, 0] else "model_v"
+        column = {"error_v": "model_v", "error_f": "model_f"}[second if axis is axes[1, 0] else first]
         level = next((getattr(row, column) for row in own if row.inertia == "lumped"), 0.0)
         if level > 1e-13:
             axis.axhline(level, color="#888", linewidth=0.8, zorder=0)
@@ -143,8 +152,10 @@ def formulations_figure(rows: list[Row]):
         axis.set_title(f"formulation: {title}; geometry: {geometry}", fontsize=10)
     for axis in axes.flat[len(kinds):]:
         axis.set_axis_off()
-    figure.supxlabel("communication steps per simulated second [1/s]" if driven else EVALUATIONS, fontsize=10)
-    figure.supylabel(F if driven else V, fontsize=10)
+    for axis in axes[-1]:
+        axis.set_xlabel("communication steps per simulated second [1/s]" if driven else EVALUATIONS)
+    for axis in axes[:, 0]:
+        axis.set_ylabel(F if driven else V)
     legend(figure, [row for row in rows if not row.penalty])
     return figure
 
@@ -165,7 +176,7 @@ def model_figure(rows: list[Row]):
              "formulation", xlim=(1e-12, 10 * max(1.0, *(max(v, f) for _, v, f in bars))))
     axis.invert_yaxis()
     axis.grid(alpha=0.25, axis="x")
-    axis.legend(fontsize=9, loc="lower left")
+    figure.legend(fontsize=9, loc="outside lower center", ncols=2, frameon=False)
     return figure
 
 
