@@ -1,4 +1,4 @@
-"""`tiefmu advise` on every example scene: what it says is run again from the scene it wrote, and its error found anew."""
+"""`tiefmu advise` on every example scene: what it says is run from the scene it wrote, and its error found anew."""
 
 import tomllib
 from pathlib import Path

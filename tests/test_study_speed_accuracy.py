@@ -126,7 +126,8 @@ def test_model_error_is_what_total_error_ends_in(free):
     rows = [row for row in records(free) if row["inertia"] == "lumped" and row["method"] == "rk4"
             and row["status"] == "ok"]
     for key in {(row["formulation"], row["geometry"]) for row in rows}:
-        finest = min((row for row in rows if (row["formulation"], row["geometry"]) == key), key=lambda r: float(r["step"]))
+        finest = min((row for row in rows if (row["formulation"], row["geometry"]) == key),
+                     key=lambda row: float(row["step"]))
         assert float(finest["error_v"]) == pytest.approx(float(finest["model_v"]), rel=1e-3)
         assert float(finest["discretisation_v"]) < 1e-3 * float(finest["model_v"])
 

@@ -144,7 +144,8 @@ def advise(source, inputs: Path | None, tolerance: float) -> Advice:
                 good.append(choice)
     if not good:
         least = min([choice.error for choice in tried] + [error for _, error in search.models if error > tolerance])
-        raise SceneError(f"{source.file}: tolerance {tolerance:g} is out of reach; the least error found is {least:.2g}")
+        raise SceneError(f"{source.file}: tolerance {tolerance:g} is out of reach; the least error found is "
+                         f"{least:.2g}")
     good.sort(key=lambda choice: choice.cost)
     # among the cheapest the simplest, in the order they were tried
     best = next(choice for choice in tried if choice in good and choice.cost <= ALIKE * good[0].cost)

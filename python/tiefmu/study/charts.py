@@ -17,10 +17,10 @@ SIZES = {method: 4.5 for method in MARKERS} | {"symplectic-euler": 7.5, "central
 LINES = {"consistent": "-", "lumped": "--"}
 HOW_TO_READ = [
     "Each point is one run. Down is more accurate, left is cheaper: of two curves the lower left one is the better "
-    "method. Errors are relative L2 norms over the whole run, against a reference with consistent inertia that is exact "
-    "to rounding: of the slaves' velocities, and of the load that the tie puts on its masters.",
-    "A curve that turns flat has reached the error of its model - lumped inertia, frozen geometry, a spring in place of "
-    "the tie - which no step cures. The discretisation error, against the same model solved exactly, goes on falling "
+    "method. Errors are relative L2 norms over the whole run, against a reference with consistent inertia that is "
+    "exact to rounding: of the slaves' velocities, and of the load that the tie puts on its masters.",
+    "A curve that turns flat has reached the error of its model - lumped inertia, frozen geometry, a spring in place "
+    "of the tie - which no step cures. The discretisation error, against the same model solved exactly, goes on falling "
     "with the order of the method.",
     "Crosses stand where a step just beyond the stability limit diverged; they have no error and no cost. Inputs are "
     "constant over the same intervals in every run, so that sampling the input is no part of the error.",
@@ -52,7 +52,8 @@ def panel(axis, rows: list[Row], x: str, y: str):
         penalty, lumped = points[0].penalty, points[0].inertia == "lumped"
         style = ":" if penalty else LINES[points[0].inertia]
         axis.plot([getattr(row, x) for row in points], [max(getattr(row, y), 1e-16) for row in points], style,
-                  color=COLOURS[method], marker=MARKERS[method], markersize=SIZES[method] - (1.5 if penalty == 1 else 0),
+                  color=COLOURS[method], marker=MARKERS[method],
+                  markersize=SIZES[method] - (1.5 if penalty == 1 else 0),
                   markerfacecolor="white" if lumped or penalty else COLOURS[method],
                   linewidth=1.0 if penalty else SIZES[method] / 3, alpha=0.6 if penalty else 1.0,
                   zorder=2 + 1 / SIZES[method])

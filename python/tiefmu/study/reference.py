@@ -1,8 +1,8 @@
 """Solutions to rounding: the solver's own RK4 on halved steps, extrapolated.
 
-On a fixed grid of steps the global error of RK4 is a series h^4, h^5, h^6, ... Each halving of the step removes one more
-term (Richardson, Romberg); what the last halving changed in the extrapolated values is the error estimate. Where that
-stays above the tolerance, rounding is to blame - positions keep the digits of the mesh, and forces come from their
+On a fixed grid of steps the global error of RK4 is a series h^4, h^5, h^6, ... Each halving of the step removes one
+more term (Richardson, Romberg); what the last halving changed in the extrapolated values is the error estimate. Where
+that stays above the tolerance, rounding is to blame - positions keep the digits of the mesh, and forces come from their
 differences - and the estimate says so.
 """
 
@@ -13,7 +13,7 @@ from .motion import FreeRun, Trajectory
 
 ORDERS = 4          # terms removed at most: h^4 .. h^7
 LEVELS = 12         # halvings at most
-MOST_STEPS = 4e6    # of one run
+MOST_STEPS = 5e5    # of one run
 
 
 def solve(run: FreeRun, tolerance: float) -> tuple[Trajectory, tuple[float, float]]:

@@ -14,6 +14,7 @@ from .._core import Diverged, SceneError
 
 EXACT = 1e-11      # estimated error of the reference
 CONVERGED = 1e-9   # of a variant's own solution, from which its model error is read
+STIFF = 1e-6       # the same of a penalty tie, whose fast oscillations cost more than they tell
 STEPS = 6          # rungs of a ladder, each half the step of the one before
 PENALTIES = [1.0, 10.0]
 HORIZON = 50       # stability limits that a run lasts at least; without an input to say how long, five times that
@@ -165,7 +166,8 @@ class Study:
         from . import reference
         run = self.exact_run(variant)
         is_reference = variant == variant.reference
-        own, error = reference.solve(run, EXACT if is_reference else CONVERGED)
+        own, error = reference.solve(run, EXACT if is_reference else STIFF if variant.penalty else
+                                     CONVERGED)
         if is_reference:
             self.references[variant.formulation] = own
             self.reference_error = max(self.reference_error, error[0])
@@ -258,9 +260,11 @@ class DrivenStudy(Study):
         from .driven import METHODS
         super().__init__(source, signals, ladder)
         if not signals.values:
-            raise SceneError(f"{source.file}: every master is driven and there is no input to drive it; give --input CSV")
+            raise SceneError(f"{source.file}: every master is driven and there is no input to drive it; give "
+                             "--input CSV")
         self.methods = METHODS
-        self.runs = sum(1 + len(self.reactions(variant)) * len(METHODS) * self.rungs(variant) for variant in self.variants)
+        self.runs = sum(1 + len(self.reactions(variant)) * len(METHODS) * self.rungs(variant)
+                        for variant in self.variants)
 
     @staticmethod
     def reactions(variant) -> list[str]:

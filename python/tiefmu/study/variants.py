@@ -1,4 +1,4 @@
-"""A scene changed one choice at a time: inertia, geometry, formulation, freedoms, method, a penalty in place of the tie.
+"""A scene changed one choice at a time: inertia, geometry, formulation, freedoms, method, or a penalty for the tie.
 
 Every change gives a scene of the ordinary kind, so that all of them run in the same compiled solver.
 """
