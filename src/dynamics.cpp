@@ -218,7 +218,7 @@ void Dynamics::gatherLoads() {
   const double *force = field(Field::slaveForce), *moment = field(Field::slaveMoment);
   slaveLoad_ = force;
   slaveMoment_ = moment;
-  strain_ = dissipation_ = 0;
+  strain_ = dissipation_ = turnRate_ = 0;
   if (!nodeLoad_.empty()) {
     std::fill(nodeLoad_.begin(), nodeLoad_.end(), 0.0);
     std::fill(nodeMoment_.begin(), nodeMoment_.end(), 0.0);
@@ -242,13 +242,33 @@ void Dynamics::gatherLoads() {
   eachSprung([&](const TieGroup& group, SegmentRange range, TieGeometry shape, std::size_t) {
     follow(group, range, shape, v, w, vs_.data(), ws_.data());
   });
+  double rate2 = 0;
   for (const Spring& spring : model.springs) {
-    const SpringLoad l = springLoad(spring, motion(spring.a, spring, v, w), motion(spring.b, spring, v, w));
+    const EndMotion a = motion(spring.a, spring, v, w), b = motion(spring.b, spring, v, w);
+    const SpringLoad l = springLoad(spring, a, b);
+    rate2 = std::max({rate2, a.w.squaredNorm(), b.w.squaredNorm()});
+    if (spring.kind == SpringKind::axial && spring.stiffness[0] > 0)
+      rate2 = std::max(rate2, (a.v - b.v).squaredNorm() / std::max((a.x - b.x).squaredNorm(), 1e-300));
     addTo(spring.a, l.fa, l.ta, nodeLoad_.data(), nodeMoment_.data(), load_.data(), moment_.data());
     addTo(spring.b, l.fb, l.tb, nodeLoad_.data(), nodeMoment_.data(), load_.data(), moment_.data());
     strain_ += l.energy;
     dissipation_ += l.dissipation;
   }
+  turnRate_ = std::sqrt(rate2);
+}
+
+void Dynamics::findTurnRate(const double* v, const double* w) {
+  double rate2 = turnRate_ * turnRate_;
+  for (int i = model.freeBegin(); i < model.rotating(); ++i) rate2 = std::max(rate2, at(w, i).squaredNorm());
+  eachGroup([&](const TieGroup& group, SegmentRange, TieGeometry shape, std::size_t) {
+    if (group.coupling != Coupling::meanMotion) return;
+    for (int e = 0; e < group.segments(); ++e) {
+      Vec3 spin;
+      meanSpin(group, {e, e + 1}, shape.frame, v, spin.data() - 3 * static_cast<std::ptrdiff_t>(e));
+      rate2 = std::max(rate2, spin.squaredNorm());
+    }
+  });
+  turnRate_ = std::sqrt(rate2);
 }
 
 void Dynamics::distributeLoads(const double* force, const double* moment, double* f, double* t) {
@@ -259,6 +279,7 @@ void Dynamics::distributeLoads(const double* force, const double* moment, double
 
 void Dynamics::evaluateReactions() {
   gatherLoads();
+  if (hasBias()) findTurnRate(velocityFor(Field::predicted), spinFor(Field::predicted));
   std::fill_n(field(Field::reactionForce), layout[Field::reactionForce].count, 0.0);
   std::fill_n(field(Field::reactionMoment), layout[Field::reactionMoment].count, 0.0);
   distributeLoads(slaveLoad_, slaveMoment_, field(Field::reactionForce), field(Field::reactionMoment));

@@ -57,6 +57,10 @@ class Dynamics {
   Power power();
   double kineticEnergy();
   double strainEnergy() const { return strain_; }
+  // How fast the geometry of the last `evaluate` turns, rad/s: springs and what holds them (which changes the
+  // stiffness), and with consistent inertia every tie (whose bias is explicit).
+  double turnRate() const { return turnRate_; }
+  bool hasBias() const { return bias_ && inertia_; }
 
   // Restoring loads K u (or damping C u) of the springs for a motion of the free nodes: u 3 per node, turn 3 per
   // rotating node, zero where not free; f, t likewise.
@@ -87,6 +91,7 @@ class Dynamics {
   void distributeLoads(const double* force, const double* moment, double* f, double* t);
   void slaveAccelerations(const double* a, const double* z, const double* v, const double* w);
   void inertialLoads();
+  void findTurnRate(const double* v, const double* w);
   void updateInertia();
   const double* velocityFor(Field f) { return has(f) ? field(f) : field(Field::velocity); }
   const double* spinFor(Field f) { return has(f) ? field(f) + 3 * model.nodes() : field(Field::spin); }
@@ -105,7 +110,7 @@ class Dynamics {
   std::vector<double> displacement_;              // small geometry: x - X
   const double* slaveLoad_ = nullptr;
   const double* slaveMoment_ = nullptr;
-  double strain_ = 0, dissipation_ = 0;
+  double strain_ = 0, dissipation_ = 0, turnRate_ = 0;
   bool gravity_ = false, offsetsTurn_ = false, bias_ = false, knownAccelerations_ = false, drivenMove_ = true;
   std::unique_ptr<ConsistentInertia> inertia_;
   std::shared_ptr<Change> change_;  // scratch of `directional`, made at its first call

@@ -7,7 +7,7 @@ void InputCurve::set(std::size_t place, int order, double value, const Layout& l
   int& index = index_[place];
   if (index == 0) {
     const auto in = [&](Field f) { return place >= layout[f].offset && place < layout[f].offset + layout[f].count; };
-    entries_.push_back({place, in(Field::velocity) || in(Field::spin), 0, 0, 0});
+    entries_.push_back({{place, 0, 0}, in(Field::velocity) || in(Field::spin), 0});
     index = static_cast<int>(entries_.size());
   }
   (order == 1 ? entries_[index - 1].first : entries_[index - 1].second) = value;
@@ -16,6 +16,14 @@ void InputCurve::set(std::size_t place, int order, double value, const Layout& l
 void InputCurve::clear() {
   for (const Entry& e : entries_) index_[e.place] = 0;
   entries_.clear();
+}
+
+void InputCurve::assign(const std::vector<InputDerivatives>& derivatives, const Layout& layout) {
+  clear();
+  for (const InputDerivatives& d : derivatives) {
+    set(d.place, 1, d.first, layout);
+    set(d.place, 2, d.second, layout);
+  }
 }
 
 void InputCurve::begin(const double* data) {

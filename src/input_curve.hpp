@@ -8,22 +8,30 @@
 
 namespace tiefmu {
 
+struct InputDerivatives {
+  std::size_t place;  // in the array
+  double first, second;
+};
+
 class InputCurve {
  public:
   // Derivative of the given order (1 or 2) of the input at `place` of the array, for the next step only.
   void set(std::size_t place, int order, double value, const Layout& layout);
   bool active() const { return !entries_.empty(); }
+  bool knows(std::size_t place) const { return active() && index_[place] > 0; }
   void clear();
+  // What has been set, in that order, and the same put back.
+  std::vector<InputDerivatives> all() const { return {entries_.begin(), entries_.end()}; }
+  void assign(const std::vector<InputDerivatives>& derivatives, const Layout& layout);
 
   void begin(const double* data);                          // tau = 0: the inputs as they stand
   void at(double tau, double* data) const;                 // inputs at tau
   void over(double tau, double h, double* data) const;     // velocities and spins at their mean over [tau, tau + h]
 
  private:
-  struct Entry {
-    std::size_t place;
+  struct Entry : InputDerivatives {
     bool motion;  // velocity or spin
-    double base, first, second;
+    double base;
   };
   std::vector<Entry> entries_;
   std::vector<int> index_;  // place -> entry + 1

@@ -57,7 +57,7 @@ Layout::Layout(const Model& model) {
   put(Field::mode, dynamic && model.finite() && !model.springs.empty()
                        ? 3 * static_cast<std::size_t>(model.free() + model.rotating() - model.freeBegin())
                        : 0);
-  put(Field::bounds, 2);
+  put(Field::bounds, 4);
   put(Field::slaveVelocity, 3 * s);
   put(Field::slaveSpin, 3 * u);
   put(Field::reactionForce, 3 * n);

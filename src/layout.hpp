@@ -24,7 +24,8 @@ enum class Field : int {
   work /*external, dissipated, total at the start, total at the end of the last step*/,
   lagged /*3n + 3r: velocity and spin that the last damping forces used*/,
   predicted /*3n + 3r: those that the last bias used*/, mode /*of the highest frequency: 3 per free unknown*/,
-  bounds /*of the highest frequency, rad/s, and of M^-1 C, 1/s*/,
+  bounds /*of the highest frequency, rad/s; of M^-1 C, 1/s; angle turned since the first was found, rad;
+    the method's limit that follows from both, s*/,
   // outputs
   slaveVelocity /*3s*/, slaveSpin /*3u*/, reactionForce /*3n*/, reactionMoment /*3r*/,
   slavePosition /*3s*/, slaveAcceleration /*3s*/,

@@ -12,7 +12,10 @@ namespace tiefmu {
 namespace {
 
 constexpr double runaway = 3e8;         // m/s, rad/s: no explicit solution that is still one gets there
-constexpr int refreshEvery = 100;       // substeps between two looks at the highest frequency
+constexpr double farAway = 1e30;        // m: beyond it squares of lengths overflow before long
+constexpr int refreshEvery = 100;       // substeps between two looks at the highest frequency, at most
+constexpr double refreshTurn = 0.1;     // rad that the geometry turns between them, at most
+constexpr double largestTurn = 0.25;    // rad a substep, where the bias of consistent inertia is explicit
 constexpr int checkEvery = 16;          // substeps between two looks for divergence
 constexpr double maxSubsteps = 1e9;
 constexpr double none = 1e30;
@@ -28,8 +31,8 @@ struct Simulation::Impl {
   Dynamics dynamics;
   Integrator integrator;
   Spectrum spectrum;
-  // What a step changes and cannot compute anew: the fields velocity .. bounds, without offsets where they follow from
-  // the segments' rotations.
+  // What a step changes and cannot compute anew: the fields velocity .. bounds (all driven: position .. work), without
+  // offsets where they follow from the segments' rotations.
   std::vector<double> backup;
   Slice kept[2];
   double time = 0;
@@ -56,40 +59,54 @@ struct Simulation::Impl {
       kept[1] = {resume, last - resume};
       backup.resize(kept[0].count + kept[1].count);
     }
+    // An all-driven scene loses what it cannot compute anew only where a segment collapses.
+    if (!model->anyFree() && layout[Field::segmentRotation].count > 0) {
+      const bool own = std::any_of(model->groups.begin(), model->groups.end(),
+                                   [](const TieGroup& g) { return g.coupling == Coupling::rotation; });
+      const Slice last = layout[Field::work], rotation = layout[Field::segmentRotation];
+      kept[0] = {layout[Field::position].offset, layout[Field::position].count + (own ? layout[Field::offset].count : 0)};
+      kept[1] = {rotation.offset, last.offset + last.count - rotation.offset};
+      backup.resize(kept[0].count + kept[1].count);
+    }
     for (int s = 0; s < 3 * model->turning(); ++s) integrates |= model->finite() && model->slaveOffset[s] != 0;
   }
 
   double* field(Field f) { return data.data() + layout[f].offset; }
 
-  double methodLimit() {
-    const double* bounds = field(Field::bounds);
-    return stableStep(model->settings.method, bounds[0], bounds[1]);
-  }
+  double methodLimit() { return field(Field::bounds)[3]; }
   double stepLimit() {
     const double limit = *field(Field::safety) * methodLimit();
     const double asked = *field(Field::timeStep);
-    return asked > 0 ? std::min(asked, limit) : limit;
+    const double turn = dynamics.hasBias() ? largestTurn / std::max(dynamics.turnRate(), 1e-30) : none;
+    return std::min({asked > 0 ? asked : none, limit, turn});
   }
 
   void findLimits() {
     double* bounds = field(Field::bounds);
-    bounds[0] = bounds[1] = 0;
+    std::fill_n(bounds, layout[Field::bounds].count, 0.0);
     *field(Field::nodalTimeStep) = nodalStep(*model, field(Field::addedMass), field(Field::addedInertia),
                                              field(Field::stiffness), field(Field::rotationalStiffness));
     if (model->anyFree() && !model->springs.empty()) {
       bounds[0] = std::sqrt(spectrum.largest(false, layout[Field::mode].count ? field(Field::mode) : nullptr).bound());
       if (dampers) bounds[1] = spectrum.largest(true, nullptr).bound();
     }
+    setLimits();
+  }
+
+  void setLimits() {
+    double* bounds = field(Field::bounds);
     *field(Field::stableTimeStep) = bounds[0] > 0 ? 2 / bounds[0] : none;
+    bounds[3] = stableStep(model->settings.method, bounds[0], bounds[1]);
   }
 
   // Geometry changes the limit; the mode of the last look is where the next one starts.
   void refreshLimits() {
+    field(Field::bounds)[2] = 0;
     if (layout[Field::mode].count == 0) return;
     const Spectrum::Value value = spectrum.refresh(field(Field::mode));
     if (value.ritz > 0 && std::isfinite(value.bound())) {
       *field(Field::bounds) = std::sqrt(value.bound());
-      *field(Field::stableTimeStep) = 2 / *field(Field::bounds);
+      setLimits();
     }
   }
 
@@ -143,6 +160,72 @@ struct Simulation::Impl {
     }
   }
 
+  // Of all nodes after h more at the present velocities (0: as they stand).
+  void checkPlaces(double h) {
+    const double *x = field(Field::position), *v = field(Field::velocity);
+    for (std::size_t k = 0; k < layout[Field::position].count; ++k) {
+      if (std::abs(x[k] + h * v[k]) < farAway) continue;  // false for NaN
+      char text[120];
+      std::snprintf(text, sizeof text, "diverged at t = %.9g s: position of node %lld is %.3g m", time,
+                    static_cast<long long>(model->nodeId[k / 3]), x[k] + h * v[k]);
+      throw Diverged(text);
+    }
+  }
+
+  void checkRotations() {
+    const double* q = field(Field::segmentRotation);
+    std::size_t k = 0;
+    for (const TieGroup& g : model->groups) {
+      if (g.coupling != Coupling::meanMotion) continue;
+      for (int e = 0; e < g.segments(); ++e, k += 4) {
+        if (std::abs(q[k]) + std::abs(q[k + 1]) + std::abs(q[k + 2]) + std::abs(q[k + 3]) < 4) continue;
+        std::string nodes;
+        for (int i = 0; i < g.corners; ++i)
+          nodes += (i ? ", " : "") +
+                   std::to_string(model->nodeId[static_cast<std::size_t>(g.node[static_cast<std::size_t>(g.corners * e + i)])]);
+        throw Diverged("diverged at t = " + std::to_string(time) + " s: the segment of nodes " + nodes +
+                       " has collapsed, its angular velocity is not a finite number");
+      }
+    }
+  }
+
+  void save() {
+    std::copy_n(data.begin() + kept[0].offset, kept[0].count, backup.begin());
+    std::copy_n(data.begin() + kept[1].offset, kept[1].count, backup.begin() + kept[0].count);
+  }
+  void undo() {
+    dynamics.inputs.at(0, data.data());
+    dynamics.inputs.clear();
+    std::copy_n(backup.begin(), kept[0].count, data.begin() + kept[0].offset);
+    std::copy_n(backup.begin() + kept[0].count, kept[1].count, data.begin() + kept[1].offset);
+    flags &= ~accelerationsValid;
+    geometryOld = loadsOld = outputsOld = true;
+  }
+
+  // All nodes are driven: positions and rotations follow the velocities, and nothing is integrated else.
+  void carry(double duration) {
+    dynamics.inputs.begin(data.data());
+    bringGeometry();
+    Dynamics::Power before{};
+    if (energy) {
+      evaluate();
+      startEnergy();
+      before = dynamics.power();
+    }
+    dynamics.inputsOver(0, duration);
+    if (dynamics.has(Field::position) && model->settings.position == Position::integrated) checkPlaces(duration);
+    if (integrates) dynamics.drift(duration, 0);
+    dynamics.inputsAt(duration);
+    if (dynamics.has(Field::segmentRotation)) checkRotations();
+    time += duration;
+    if (!energy) return;
+    dynamics.evaluateReactions();
+    const Dynamics::Power after = dynamics.power();
+    field(Field::work)[0] += 0.5 * duration * (before.external + after.external);
+    field(Field::work)[1] += 0.5 * duration * (before.dissipated + after.dissipated);
+    field(Field::work)[3] = totalEnergy();
+  }
+
   void integrate(double duration) {
     const double end = time + duration;
     double left = duration;
@@ -158,7 +241,7 @@ struct Simulation::Impl {
       if (!(count <= maxSubsteps)) {
         char text[160];
         std::snprintf(text, sizeof text, "a step of %.6g s would take %.3g substeps of at most %.3g s", duration, count, limit);
-        throw Diverged(text);
+        throw StepTooLong(text);
       }
       const std::int64_t n = static_cast<std::int64_t>(count);
       const double h = left / count;
@@ -181,15 +264,17 @@ struct Simulation::Impl {
           before = after;
         }
         if (substeps % checkEvery == 0) checkFinite();
-        if (substeps % refreshEvery == 0) {
-          refreshLimits();
-          if (stepLimit() < h * (1 - 1e-9)) break;
-        }
+        double& turned = field(Field::bounds)[2];
+        turned += h * dynamics.turnRate();
+        if (substeps % refreshEvery == 0 || turned > refreshTurn) refreshLimits();
+        if (stepLimit() < h * (1 - 1e-9)) break;
       }
       left = done < n ? left - static_cast<double>(done) * h : 0;
     }
     time = end;
     checkFinite();
+    if (dynamics.has(Field::position)) checkPlaces(0);
+    if (dynamics.has(Field::segmentRotation)) checkRotations();
     if (energy) field(Field::work)[3] = totalEnergy();
   }
 };
@@ -226,24 +311,39 @@ void Simulation::outputRates(double* rates) {
   updateOutputs();
   State before;
   save(before);
-  const InputCurve inputs = s.dynamics.inputs;
   const std::int64_t evaluations = s.dynamics.evaluations;
-  if (s.model->accelerationInputs())
-    for (const auto& [motion, rate] : {std::pair{Field::velocity, Field::acceleration},
-                                       std::pair{Field::spin, Field::angularAcceleration}})
-      for (std::size_t k = 0; k < s.layout[motion].count; ++k) {
-        const std::size_t node = k / 3;
-        if (static_cast<int>(node) >= s.model->freeBegin() && static_cast<int>(node) < s.model->freeEnd()) continue;
-        setInputDerivative(s.layout[motion].offset + k, 1, s.field(rate)[k]);
-      }
+  const auto undo = [&] {
+    restore(before);
+    s.dynamics.evaluations = evaluations;
+  };
   const double limit = s.model->anyFree() ? s.stepLimit() : none;
   const double h = 1e-5 * std::min(limit, 1.0);
-  step(h);
-  updateOutputs();
-  for (std::size_t k = 0; k < s.layout.size; ++k) rates[k] = (s.data[k] - before.data[k]) / h;
-  restore(before);
-  s.dynamics.inputs = inputs;
-  s.dynamics.evaluations = evaluations;
+  try {
+    if (s.model->accelerationInputs())
+      for (const auto& [motion, rate] : {std::pair{Field::velocity, Field::acceleration},
+                                         std::pair{Field::spin, Field::angularAcceleration}})
+        for (std::size_t k = 0; k < s.layout[motion].count; ++k) {
+          const int node = static_cast<int>(k / 3);
+          const std::size_t place = s.layout[motion].offset + k;
+          if (node >= s.model->freeBegin() && node < s.model->freeEnd()) continue;
+          if (!s.dynamics.inputs.knows(place)) setInputDerivative(place, 1, s.field(rate)[k]);
+        }
+    // Two steps: what the outputs hold of an earlier step's half-step velocities is gone after the first.
+    std::vector<InputDerivatives> inputs = s.dynamics.inputs.all();
+    step(h);
+    updateOutputs();
+    std::copy(s.data.begin(), s.data.end(), rates);
+    for (InputDerivatives& d : inputs) d.first += h * d.second;
+    s.dynamics.inputs.assign(inputs, s.layout);
+    step(h);
+    updateOutputs();
+  } catch (...) {
+    undo();
+    throw;
+  }
+  for (std::size_t k = 0; k < s.layout.size; ++k) rates[k] = (s.data[k] - rates[k]) / h;
+  for (Field f : {Field::stableTimeStep, Field::nodalTimeStep}) rates[s.layout[f].offset] = 0;
+  undo();
 }
 
 void Simulation::reset() {
@@ -274,49 +374,20 @@ void Simulation::initialise(double time) {
 
 void Simulation::step(double duration) {
   Impl& s = *impl_;
-  if (!s.model->anyFree()) {
-    s.bringGeometry();
-    s.dynamics.inputs.begin(s.data.data());
-    if (s.energy) {
-      s.evaluate();
-      s.startEnergy();
-      const Dynamics::Power before = s.dynamics.power();
-      s.dynamics.inputsOver(0, duration);
-      s.dynamics.drift(duration, 0);
-      s.dynamics.inputsAt(duration);
-      s.dynamics.evaluateReactions();
-      const Dynamics::Power after = s.dynamics.power();
-      s.field(Field::work)[0] += 0.5 * duration * (before.external + after.external);
-      s.field(Field::work)[1] += 0.5 * duration * (before.dissipated + after.dissipated);
-      s.field(Field::work)[3] = s.totalEnergy();
-    } else {
-      s.dynamics.inputsOver(0, duration);
-      if (s.integrates) s.dynamics.drift(duration, 0);
-      s.dynamics.inputsAt(duration);
-    }
-    s.dynamics.inputs.clear();
-    s.time += duration;
-    s.loadsOld = s.outputsOld = true;
-    return;
-  }
-  std::copy_n(s.data.begin() + s.kept[0].offset, s.kept[0].count, s.backup.begin());
-  std::copy_n(s.data.begin() + s.kept[1].offset, s.kept[1].count, s.backup.begin() + s.kept[0].count);
   const double time = s.time;
   const std::int64_t substeps = s.substeps;
-  s.outputsOld = true;
   const auto undo = [&] {
-    s.dynamics.inputs.at(0, s.data.data());
-    s.dynamics.inputs.clear();
-    std::copy_n(s.backup.begin(), s.kept[0].count, s.data.begin() + s.kept[0].offset);
-    std::copy_n(s.backup.begin() + s.kept[0].count, s.kept[1].count, s.data.begin() + s.kept[1].offset);
+    s.undo();
     s.time = time;
     s.substeps = substeps;
-    s.flags &= ~accelerationsValid;
-    s.geometryOld = s.loadsOld = true;
   };
+  s.save();
   try {
-    s.integrate(duration);
+    if (s.model->anyFree()) s.integrate(duration);
+    else s.carry(duration);
     s.dynamics.inputs.clear();
+    s.outputsOld = true;
+    if (!s.model->anyFree()) s.loadsOld = true;
   } catch (const SceneError& e) {  // the mass matrix of a geometry that has blown up
     undo();
     throw Diverged("diverged after t = " + std::to_string(time) + " s: " + e.what());
@@ -351,6 +422,7 @@ void Simulation::save(State& state) const {
   state.time = s.time;
   state.substeps = s.substeps;
   state.flags = s.flags;
+  state.inputs = s.dynamics.inputs.all();
 }
 
 void Simulation::restore(const State& state) {
@@ -363,6 +435,7 @@ void Simulation::restore(const State& state) {
   s.time = state.time;
   s.substeps = state.substeps;
   s.flags = state.flags;
+  s.dynamics.inputs.assign(state.inputs, s.layout);
   if (!s.prepared || !sameMasses) s.dynamics.prepareMass();
   s.prepared = true;
   s.geometryOld = s.loadsOld = s.outputsOld = true;

@@ -7,12 +7,18 @@
 #include <string>
 #include <vector>
 
+#include "input_curve.hpp"
 #include "layout.hpp"
 
 namespace tiefmu {
 
 // A step ended in a non-finite or runaway number; the state before the step has been put back.
 struct Diverged : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+// A step that would take more than a thousand million substeps; the state before it has been put back.
+struct StepTooLong : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
@@ -42,11 +48,12 @@ class Simulation {
   // How an input at `place` of the array moves inside the next step: order 1 (its rate) or 2. Afterwards the input
   // stands at the step's end.
   void setInputDerivative(std::size_t place, int order, double value);
-  // Rate of change of every number of the array at the present state, by a short trial step with inputs moving as
+  // Rate of change of every number of the array at the present state, by short trial steps with inputs moving as
   // their known rates say (velocities by the accelerations given). `rates` is laid out like `data`. First order.
+  // The limits of the time step, which change in leaps, get zero. Throws Diverged; changes nothing.
   void outputRates(double* rates);
   // From time() to time() + duration (s, > 0, finite), in equal substeps of at most safety * limit. No allocation.
-  // Throws Diverged.
+  // Throws Diverged, StepTooLong.
   void step(double duration);
   // Brings outputs in line with the inputs last set; cheap when nothing changed.
   void updateOutputs();
@@ -57,6 +64,7 @@ class Simulation {
     double time = 0;
     std::int64_t substeps = 0;
     std::uint32_t flags = 0;
+    std::vector<InputDerivatives> inputs;  // for the next step
   };
   void save(State& state) const;
   void restore(const State& state);

@@ -93,6 +93,9 @@ Spectrum::Spectrum(Dynamics& dynamics)
   f_.resize(u_.size());
   turn_.resize(3 * static_cast<std::size_t>(model.rotating()));
   t_.resize(turn_.size());
+  // Room for `refresh`, which may come first: after a state from another process.
+  basis_.resize(static_cast<std::size_t>(size_) * (refreshVectors + 1));
+  image_.resize(basis_.size());
 }
 
 // Compact vectors hold the free translations, then the free rotations.
