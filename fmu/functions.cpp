@@ -46,10 +46,6 @@ fmi2Status noVariables(fmi2Component c, const Call& call, size_t count) {
   });
 }
 
-fmi2Status notBuilt(fmi2Component c, const Call& call) {
-  return guard(c, call, [](Instance&) { throw Refused("not supported; see the capability flags"); });
-}
-
 }  // namespace
 
 extern "C" {
@@ -80,7 +76,7 @@ fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2Str
     logger.environment = functions->componentEnvironment;
     logger.instanceName = instanceName;
     logger.on = loggingOn;
-    return new Instance(std::move(logger), loadResource(fmuResourceLocation, fmuGUID).model);
+    return new Instance(std::move(logger), loadResource(fmuResourceLocation, fmuGUID));
   } catch (const std::exception& e) {
     return fail(e.what());
   } catch (...) {
@@ -160,31 +156,37 @@ fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate* state) {
   return guard(c, call::freeFMUstate, [&](Instance& i) { i.freeState(state); });
 }
 
-fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate, size_t*) {
-  return notBuilt(c, call::serializedFMUstateSize);
+fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate state, size_t* size) {
+  return guard(c, call::serializedFMUstateSize, [&](Instance& i) {
+    if (!size) throw Refused("the place for the size is a null pointer");
+    *size = i.serializedStateSize(state);
+  });
 }
 
-fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate, fmi2Byte*, size_t) {
-  return notBuilt(c, call::serializeFMUstate);
+fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate state, fmi2Byte bytes[], size_t size) {
+  return guard(c, call::serializeFMUstate, [&](Instance& i) { i.serializeState(state, bytes, size); });
 }
 
-fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte*, size_t, fmi2FMUstate*) {
-  return notBuilt(c, call::deSerializeFMUstate);
+fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte bytes[], size_t size, fmi2FMUstate* state) {
+  return guard(c, call::deSerializeFMUstate, [&](Instance& i) { i.deserializeState(bytes, size, state); });
 }
 
-fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReference*, size_t, const fmi2ValueReference*,
-                                        size_t, const fmi2Real*, fmi2Real*) {
-  return notBuilt(c, call::getDirectionalDerivative);
+fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReference unknown[], size_t unknowns,
+                                        const fmi2ValueReference known[], size_t knowns, const fmi2Real seed[],
+                                        fmi2Real change[]) {
+  return guard(c, call::getDirectionalDerivative, [&](Instance& i) {
+    i.directionalDerivative(unknown, unknowns, known, knowns, seed, change);
+  });
 }
 
-fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference*, size_t, const fmi2Integer*,
-                                       const fmi2Real*) {
-  return notBuilt(c, call::setRealInputDerivatives);
+fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
+                                       const fmi2Integer order[], const fmi2Real value[]) {
+  return guard(c, call::setRealInputDerivatives, [&](Instance& i) { i.setInputDerivatives(vr, nvr, order, value); });
 }
 
-fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReference*, size_t, const fmi2Integer*,
-                                        fmi2Real*) {
-  return notBuilt(c, call::getRealOutputDerivatives);
+fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
+                                        const fmi2Integer order[], fmi2Real value[]) {
+  return guard(c, call::getRealOutputDerivatives, [&](Instance& i) { i.outputDerivatives(vr, nvr, order, value); });
 }
 
 fmi2Status fmi2DoStep(fmi2Component c, fmi2Real currentCommunicationPoint, fmi2Real communicationStepSize,

@@ -7,7 +7,9 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <limits>
 
+#include "../modelDescription/bytes.hpp"
 #include "../modelDescription/xml.hpp"
 
 namespace tiefmu {
@@ -94,13 +96,6 @@ std::string text(double number) {
   return buffer;
 }
 
-// Bytes from outside as they may stand in a message.
-std::string printable(std::string bytes) {
-  for (char& c : bytes)
-    if (c < ' ' || c > '~') c = '?';
-  return bytes;
-}
-
 // Communication points are sums of steps that the master may round in another order than we do; but a missed or
 // repeated step is always seen.
 double tolerance(double time, double step) { return 1e-12 * std::abs(time) + 1e-3 * step; }
@@ -137,8 +132,10 @@ void Logger::write(fmi2Status status, Category category, const char* message) co
   callback(environment, instanceName.c_str(), status, logCategories[static_cast<int>(category)].name, "%s", message);
 }
 
-Instance::Instance(Logger instanceLogger, Model model)
-    : logger(std::move(instanceLogger)), simulation(std::make_shared<const Model>(std::move(model))) {
+Instance::Instance(Logger instanceLogger, Resource resource)
+    : logger(std::move(instanceLogger)),
+      guid(std::move(resource.guid)),
+      simulation(std::make_shared<const Model>(std::move(resource.model))) {
   for (const Block& b : variables(simulation.model(), simulation.layout())) {
     references = b.reference + static_cast<std::uint32_t>(b.count());
     const bool continues = !ranges.empty() && ranges.back().causality == b.causality &&
@@ -190,12 +187,46 @@ void Instance::exitInitializationMode() {
                                 " s, limit of the integrator " + text(simulation.integratorLimit()) + " s";
     logger.write(fmi2OK, Category::stability, message.c_str());
   }
+  findHostStep();
   state = stepComplete;
+}
+
+// Seed (3) for what the host moves: it carries the declared mass and the lumped addition (THEORY 5), on the declared
+// stiffness and the slaves'. Where no mass is declared nothing is known.
+void Instance::findHostStep() {
+  const Model& model = simulation.model();
+  hostStep = std::numeric_limits<double>::infinity();
+  const auto consider = [&](double own, double added, double stiffness, int node) {
+    if (!(own > 0) || !(stiffness > 0)) return;
+    const double step = std::sqrt(2 * (own + added) / stiffness);
+    if (step >= hostStep) return;
+    hostStep = step;
+    hostNode = node;
+  };
+  for (int group : {rotatingDrivenMaster, drivenMaster})
+    for (int i = model.begin[group]; i < model.begin[group + 1]; ++i) {
+      consider(model.nodeMass[i], simulation.field(Field::addedMass)[i], simulation.field(Field::stiffness)[i], i);
+      if (i < model.rotating())
+        consider(model.nodeInertia[i], simulation.field(Field::addedInertia)[i],
+                 simulation.field(Field::rotationalStiffness)[i], i);
+    }
+}
+
+void Instance::warnOfStep(double step) {
+  if (warnedOfStep || !logger.wants(Category::stability)) return;
+  warnedOfStep = true;
+  const std::string message = "the communication step " + text(step) + " s is longer than the nodal time step " +
+                              text(hostStep) + " s of driven master node " +
+                              std::to_string(simulation.model().nodeId[hostNode]) +
+                              ": an explicit host is unstable with it";
+  logger.write(fmi2Warning, Category::stability, message.c_str());
 }
 
 void Instance::reset() {
   simulation.reset();
   clock = {};
+  hostStep = std::numeric_limits<double>::infinity();
+  warnedOfStep = false;
   state = instantiated;
 }
 
@@ -279,42 +310,15 @@ void Instance::doStep(double point, double step) {
     throw Refused("the step starts at " + text(point) + " s, but the instance stands at " + text(clock.time) + " s");
   if (clock.stopDefined && point + step > clock.stop + allowed)
     throw Refused("the step ends at " + text(point + step) + " s, after the stop time " + text(clock.stop) + " s");
-  simulation.step(step);
-  clock.time = point + step;  // the master's sum, so that rounding does not pull the two apart
-}
-
-Instance::SavedState& Instance::known(fmi2FMUstate saved) const {
-  const auto found = savedStates.find(saved);
-  if (found == savedStates.end()) throw Refused("this is no state that the instance has saved");
-  return *found->second;
-}
-
-void Instance::getState(fmi2FMUstate* saved) {
-  if (!saved) throw Refused("the place for the state is a null pointer");
-  if (!*saved) {
-    auto fresh = std::make_unique<SavedState>();
-    const fmi2FMUstate handle = fresh.get();
-    savedStates.emplace(handle, std::move(fresh));
-    *saved = handle;
+  if (point + step == point)
+    throw Refused("the step size " + text(step) + " s is too small to move the time on from " + text(point) + " s");
+  if (step > hostStep) warnOfStep(step);
+  try {
+    simulation.step(step);
+  } catch (const StepTooLong& e) {
+    throw Refused(e.what());
   }
-  SavedState& s = known(*saved);
-  simulation.save(s.simulation);
-  s.state = state;
-  s.clock = clock;
-}
-
-void Instance::setState(fmi2FMUstate saved) {
-  const SavedState& s = known(saved);
-  simulation.restore(s.simulation);
-  state = s.state;
-  clock = s.clock;
-}
-
-void Instance::freeState(fmi2FMUstate* saved) {
-  if (!saved || !*saved) return;
-  known(*saved);
-  savedStates.erase(*saved);
-  *saved = nullptr;
+  clock.time = point + step;  // the master's sum, so that rounding does not pull the two apart
 }
 
 }  // namespace tiefmu

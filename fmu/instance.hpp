@@ -1,6 +1,7 @@
 // One FMU instance: a simulation, where its variables stand, its state, and its logger.
 #pragma once
 
+#include <limits>
 #include <memory>
 #include <stdexcept>
 #include <string>
@@ -9,7 +10,7 @@
 
 #include "../modelDescription/resource.hpp"
 #include "../modelDescription/variables.hpp"
-#include "calls.hpp"
+#include "saved_state.hpp"
 
 extern "C" {
 #include "fmi2FunctionTypes.h"
@@ -46,7 +47,7 @@ Resource loadResource(const std::string& location, const std::string& guid);
 
 class Instance {
  public:
-  Instance(Logger instanceLogger, Model model);
+  Instance(Logger instanceLogger, Resource resource);
 
   State state = instantiated;
   Logger logger;
@@ -64,6 +65,18 @@ class Instance {
   void getState(fmi2FMUstate* saved);
   void setState(fmi2FMUstate saved);
   void freeState(fmi2FMUstate* saved);
+  std::size_t serializedStateSize(fmi2FMUstate saved) const;
+  void serializeState(fmi2FMUstate saved, fmi2Byte bytes[], std::size_t size) const;
+  // `saved`: a state of this instance to overwrite, or anything else, which a new state replaces.
+  void deserializeState(const fmi2Byte bytes[], std::size_t size, fmi2FMUstate* saved);
+
+  // change[k] = sum over l of d unknown[k] / d known[l] * seed[l], for outputs and inputs.
+  void directionalDerivative(const fmi2ValueReference unknown[], std::size_t unknowns, const fmi2ValueReference known[],
+                             std::size_t knowns, const double seed[], double change[]);
+  void setInputDerivatives(const fmi2ValueReference references[], std::size_t count, const fmi2Integer orders[],
+                           const double values[]);
+  void outputDerivatives(const fmi2ValueReference references[], std::size_t count, const fmi2Integer orders[],
+                         double values[]);
 
  private:
   // References [first, end) stand at places [place, ...) of the simulation's array.
@@ -80,32 +93,30 @@ class Instance {
     std::size_t count;
   };
 
-  struct Clock {
-    double time = 0, stop = 0;
-    bool stopDefined = false;
-  };
-
-  struct SavedState {
-    Simulation::State simulation;
-    State state;
-    Clock clock;
-  };
-
   const Range& rangeOf(std::uint32_t reference) const;
   [[noreturn]] void refuseToSet(const Range& range, std::uint32_t reference) const;
   [[noreturn]] void refuseValue(std::uint32_t first, const double* values) const;
   std::string nameOf(std::uint32_t reference) const;
   SavedState& known(fmi2FMUstate saved) const;
+  void keep(fmi2FMUstate* saved, std::unique_ptr<SavedState> fresh);
   // Calls use(range, first reference, number, index of the first) for each run of consecutive references.
   template <class Use>
   void forRuns(const fmi2ValueReference references[], std::size_t count, Use use) const;
+  std::size_t placeOf(std::uint32_t reference, Causality causality) const;
+  void findHostStep();
+  void warnOfStep(double step);
 
+  std::string guid;
   Simulation simulation;
   std::vector<Range> ranges;
   std::vector<std::uint32_t> firstRange;  // range of every 64th reference
   std::uint32_t references = 0;
   std::vector<Run> runs;  // of the present fmi2SetReal
+  std::vector<double> scratch;  // laid out like the simulation's array
   Clock clock;
+  double hostStep = std::numeric_limits<double>::infinity();  // the least that a driven master's stiffness allows, s
+  int hostNode = 0;
+  bool warnedOfStep = false;
   std::unordered_map<fmi2FMUstate, std::unique_ptr<SavedState>> savedStates;
 };
 

@@ -2,8 +2,9 @@
 
 #include <cereal/archives/portable_binary.hpp>
 #include <sstream>
-#include <streambuf>
 #include <type_traits>
+
+#include "bytes.hpp"
 
 namespace tiefmu {
 namespace {
@@ -17,17 +18,6 @@ std::uint64_t checksum(std::string_view bytes) {
   std::uint64_t hash = 14695981039346656037u;
   for (unsigned char c : bytes) hash = (hash ^ c) * 1099511628211u;
   return hash;
-}
-
-void putNumber(std::string& out, std::uint64_t value, int bytes) {
-  for (int i = 0; i < bytes; ++i) out += static_cast<char>(value >> (8 * i) & 255);
-}
-
-std::uint64_t takeNumber(std::string_view& in, int bytes) {
-  std::uint64_t value = 0;
-  for (int i = 0; i < bytes; ++i) value |= static_cast<std::uint64_t>(static_cast<unsigned char>(in[i])) << (8 * i);
-  in.remove_prefix(bytes);
-  return value;
 }
 
 class Writer {
@@ -49,14 +39,6 @@ class Writer {
 
  private:
   cereal::PortableBinaryOutputArchive archive;
-};
-
-struct View : std::streambuf {
-  explicit View(std::string_view bytes) {
-    char* begin = const_cast<char*>(bytes.data());
-    setg(begin, begin, begin + bytes.size());
-  }
-  std::size_t left() const { return static_cast<std::size_t>(egptr() - gptr()); }
 };
 
 class Reader {

@@ -139,10 +139,10 @@ void appendHead(std::string& out, const Description& d, bool structured) {
   attribute(out, "variableNamingConvention", structured ? "structured" : "flat");
   out += ">\n<CoSimulation";
   attribute(out, "modelIdentifier", modelIdentifier(d.name));
-  out += R"( canHandleVariableCommunicationStepSize="true" canInterpolateInputs="false" maxOutputDerivativeOrder="0")"
+  out += R"( canHandleVariableCommunicationStepSize="true" canInterpolateInputs="true" maxOutputDerivativeOrder="1")"
          R"( canRunAsynchronuously="false" canBeInstantiatedOnlyOncePerProcess="false")"
-         R"( canNotUseMemoryManagementFunctions="true" canGetAndSetFMUstate="true" canSerializeFMUstate="false")"
-         R"( providesDirectionalDerivative="false"/>)"
+         R"( canNotUseMemoryManagementFunctions="true" canGetAndSetFMUstate="true" canSerializeFMUstate="true")"
+         R"( providesDirectionalDerivative="true"/>)"
          "\n";
 }
 

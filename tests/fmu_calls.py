@@ -23,11 +23,13 @@ class Callbacks(ctypes.Structure):
 
 
 class Fmu:
-    """A scene built and unpacked into a new folder in `folder`, with its description read and validated."""
+    """A scene (dict or TOML file) built, or an FMU, unpacked into a new folder in `folder`, with its description read
+    and validated."""
 
-    def __init__(self, scene: dict, folder: Path):
+    def __init__(self, scene, folder: Path):
         self.folder = Path(tempfile.mkdtemp(dir=folder))  # a library that is loaded must not be overwritten
-        self.path = tiefmu.build(tiefmu.load(scene), self.folder / "scene.fmu")
+        made = isinstance(scene, Path) and scene.suffix == ".fmu"
+        self.path = scene if made else tiefmu.build(tiefmu.load(scene), self.folder / "scene.fmu")
         with zipfile.ZipFile(self.path) as archive:
             archive.extractall(self.folder)
         self.description = fmpy.read_model_description(str(self.path), validate=True, validate_variable_names=False,
@@ -111,3 +113,9 @@ class Instance:
         if self.component:
             self.fmu.library.fmi2FreeInstance(c_void_p(self.component))
             self.component = None
+
+
+def set_derivatives(instance, names, orders, values) -> int:
+    n = len(names)
+    return instance.call("SetRealInputDerivatives", (c_uint * n)(*[instance.fmu.reference[name] for name in names]),
+                         c_size_t(n), (c_int * n)(*orders), (c_double * n)(*values))
