@@ -145,6 +145,28 @@ def test_a_state_to_start_from(case, expected):
     instance.freeInstance()
 
 
+def test_input_derivatives(case):
+    """FMPy gives the slope of the interval before, and has room for nine inputs."""
+    inputs = {name: values[:STEPS] for name, values in list(case["inputs"]["tie"].items())[:9]}
+    slopes = {name: [0.0] + [(b - a) / STEP for a, b in zip(values, values[1:])] for name, values in inputs.items()}
+    moved = {**case, "inputs": {"tie": inputs}, "derivatives": {"tie": slopes}}
+    expected = plain(moved)
+    same_bits({"tie": simulate(case, input=signals(inputs), set_input_derivatives=True)[1:]}, expected)
+    held = plain({**moved, "derivatives": {}})["tie"]
+    assert np.abs(expected["tie"] - held).max() > 1e-3 * np.abs(held).max()
+
+
+def test_a_serialized_state_in_a_new_instance(case, expected):
+    half = STEPS // 2
+    instance = instantiated(case["fmus"]["tie"])
+    simulate(case, stop_time=half * STEP, terminate=False, set_stop_time=False, fmu_instance=instance)
+    state = instance.getFMUState()
+    data = instance.serializeFMUState(state)
+    instance.freeFMUState(state)
+    instance.freeInstance()
+    np.testing.assert_array_equal(simulate(case, start_time=half * STEP, fmu_state=data)[1:], expected[half:])
+
+
 # --------------------------------------------------------------------------------------------------------- cross-check
 
 def cross_check(case, sign: float, folder) -> list[str]:
