@@ -317,6 +317,11 @@ void Instance::doStep(double point, double step) {
     simulation.step(step);
   } catch (const StepTooLong& e) {
     throw Refused(e.what());
+  } catch (const Diverged& e) {
+    for (const Range& r : ranges)
+      if (e.place >= r.place && e.place - r.place < r.end - r.first)
+        throw Diverged(e.what() + ("; variable '" + nameOf(r.first + static_cast<std::uint32_t>(e.place - r.place)) + "'"));
+    throw;
   }
   clock.time = point + step;  // the master's sum, so that rounding does not pull the two apart
 }

@@ -158,6 +158,25 @@ void Dynamics::updateGeometry() {
   });
 }
 
+std::string Dynamics::collapsed() const {
+  std::size_t k = 0;
+  const double* rotation = has(Field::segmentRotation) ? data + layout[Field::segmentRotation].offset : nullptr;
+  for (const TieGroup& group : model.groups) {
+    if (group.coupling != Coupling::meanMotion) continue;
+    for (int e = 0; e < group.segments(); ++e, ++k) {
+      const double* m = frames_[k].inverse;
+      double sum = m[0] + m[1] + m[2] + m[3] + m[4] + m[5];
+      if (rotation) sum += rotation[4 * k] + rotation[4 * k + 1] + rotation[4 * k + 2] + rotation[4 * k + 3];
+      if (std::isfinite(sum)) continue;
+      std::string ids;
+      for (int i = 0; i < group.corners; ++i)
+        ids += (i ? ", " : "") + std::to_string(model.nodeId[group.node[group.corners * e + i]]);
+      return ids;
+    }
+  }
+  return {};
+}
+
 // Positions of the slaves that hold springs. In small displacements they are what the frozen T makes of the nodes'.
 void Dynamics::placeSlaves(double* xs, bool sprungOnly) {
   const double* x = field(Field::position);

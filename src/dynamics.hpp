@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "inertia.hpp"
@@ -28,6 +29,9 @@ class Dynamics {
   void prepare();       // from the parameters: added inertia, stiffness, then prepareMass. Throws SceneError
   void prepareMass();   // what stands beside the array: geometry and mass matrix. Throws SceneError
   void updateGeometry();
+  // Node ids of a meanMotion segment whose nodes have come to lie on a line, so that its motion is not defined: "1, 2, 3".
+  // Empty: none.
+  std::string collapsed() const;
 
   // Loads at the present geometry with `lagged` velocities in the dampers: T^T f_s into the reactions, then the free
   // nodes' accelerations, with `predicted` velocities in the bias.

@@ -60,7 +60,9 @@ struct Simulation::Impl {
       backup.resize(kept[0].count + kept[1].count);
     }
     // An all-driven scene loses what it cannot compute anew only where a segment collapses.
-    if (!model->anyFree() && layout[Field::segmentRotation].count > 0) {
+    const bool frames = std::any_of(model->groups.begin(), model->groups.end(),
+                                    [](const TieGroup& g) { return g.coupling == Coupling::meanMotion; });
+    if (!model->anyFree() && frames && model->finite()) {
       const bool own = std::any_of(model->groups.begin(), model->groups.end(),
                                    [](const TieGroup& g) { return g.coupling == Coupling::rotation; });
       const Slice last = layout[Field::work], rotation = layout[Field::segmentRotation];
@@ -113,6 +115,7 @@ struct Simulation::Impl {
   void bringGeometry() {
     if (!geometryOld) return;
     dynamics.updateGeometry();
+    checkSegments();
     geometryOld = false;
   }
 
@@ -155,7 +158,7 @@ struct Simulation::Impl {
                         time, f == Field::velocity ? "velocity" : "angular velocity",
                         static_cast<long long>(model->nodeId[i]), v[3 * i + k],
                         f == Field::velocity ? "m/s" : "rad/s", methodLimit());
-          throw Diverged(text);
+          throw Diverged(text, layout[f].offset + static_cast<std::size_t>(3 * i + k));
         }
     }
   }
@@ -168,25 +171,17 @@ struct Simulation::Impl {
       char text[120];
       std::snprintf(text, sizeof text, "diverged at t = %.9g s: position of node %lld is %.3g m", time,
                     static_cast<long long>(model->nodeId[k / 3]), x[k] + h * v[k]);
-      throw Diverged(text);
+      throw Diverged(text, layout[Field::position].offset + k);
     }
   }
 
-  void checkRotations() {
-    const double* q = field(Field::segmentRotation);
-    std::size_t k = 0;
-    for (const TieGroup& g : model->groups) {
-      if (g.coupling != Coupling::meanMotion) continue;
-      for (int e = 0; e < g.segments(); ++e, k += 4) {
-        if (std::abs(q[k]) + std::abs(q[k + 1]) + std::abs(q[k + 2]) + std::abs(q[k + 3]) < 4) continue;
-        std::string nodes;
-        for (int i = 0; i < g.corners; ++i)
-          nodes += (i ? ", " : "") +
-                   std::to_string(model->nodeId[static_cast<std::size_t>(g.node[static_cast<std::size_t>(g.corners * e + i)])]);
-        throw Diverged("diverged at t = " + std::to_string(time) + " s: the segment of nodes " + nodes +
-                       " has collapsed, its angular velocity is not a finite number");
-      }
-    }
+  void checkSegments() {
+    if (!model->finite()) return;
+    const std::string nodes = dynamics.collapsed();
+    if (nodes.empty()) return;
+    char text[80];
+    std::snprintf(text, sizeof text, "diverged at t = %.9g s: ", time);
+    throw Diverged(text + ("the segment of nodes " + nodes) + " has collapsed to a line or a point");
   }
 
   void save() {
@@ -216,7 +211,7 @@ struct Simulation::Impl {
     if (dynamics.has(Field::position) && model->settings.position == Position::integrated) checkPlaces(duration);
     if (integrates) dynamics.drift(duration, 0);
     dynamics.inputsAt(duration);
-    if (dynamics.has(Field::segmentRotation)) checkRotations();
+    checkSegments();
     time += duration;
     if (!energy) return;
     dynamics.evaluateReactions();
@@ -274,7 +269,7 @@ struct Simulation::Impl {
     time = end;
     checkFinite();
     if (dynamics.has(Field::position)) checkPlaces(0);
-    if (dynamics.has(Field::segmentRotation)) checkRotations();
+    checkSegments();
     if (energy) field(Field::work)[3] = totalEnergy();
   }
 };
@@ -361,6 +356,7 @@ void Simulation::initialise(double time) {
   Impl& s = *impl_;
   s.time = time;
   s.dynamics.prepare();
+  s.checkSegments();
   s.findLimits();
   s.flags = initialised;
   s.prepared = true;

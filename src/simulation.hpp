@@ -12,9 +12,13 @@
 
 namespace tiefmu {
 
-// A step ended in a non-finite or runaway number; the state before the step has been put back.
+// A step ended in a non-finite or runaway number, that at `place` of the array if it is one; the state before the step
+// has been put back.
 struct Diverged : std::runtime_error {
-  using std::runtime_error::runtime_error;
+  explicit Diverged(const std::string& message, std::size_t where = nowhere)
+      : std::runtime_error(message), place(where) {}
+  static constexpr std::size_t nowhere = ~std::size_t{0};
+  std::size_t place;
 };
 
 // A step that would take more than a thousand million substeps; the state before it has been put back.
