@@ -67,22 +67,6 @@ bool allFinite(const double* values, std::size_t count) {
   return carry >> 63 == 0;
 }
 
-// How many of `count` references ascend by one from the first.
-std::size_t runLength(const fmi2ValueReference refs[], std::size_t count) {
-  constexpr std::size_t stride = 16;  // compared at once, without a branch each
-  const std::uint32_t first = refs[0];
-  std::size_t run = 1;
-  if (count == 1 || refs[1] != first + 1) return run;
-  while (run + stride <= count) {
-    std::uint32_t differs = 0;
-    for (std::size_t j = 0; j < stride; ++j) differs |= refs[run + j] ^ (first + static_cast<std::uint32_t>(run + j));
-    if (differs) break;
-    run += stride;
-  }
-  while (run < count && refs[run] == first + run) ++run;
-  return run;
-}
-
 void copy(const double* from, std::size_t count, double* to) {
   if (count < 4)  // shorter than the call of memcpy
     for (std::size_t i = 0; i < count; ++i) to[i] = from[i];
@@ -245,19 +229,6 @@ std::string Instance::nameOf(std::uint32_t reference) const {
       return variableName(b, offset / components, static_cast<int>(offset % components));
     }
   return {};
-}
-
-template <class Use>
-void Instance::forRuns(const fmi2ValueReference refs[], std::size_t count, Use use) const {
-  if (count > 0 && !refs) throw Refused("the array of value references is a null pointer");
-  for (std::size_t i = 0; i < count;) {
-    const std::uint32_t first = refs[i];
-    const Range& range = rangeOf(first);
-    const std::size_t most = std::min<std::size_t>(count - i, range.end - first);
-    const std::size_t run = runLength(refs + i, most);
-    use(range, first, run, i);
-    i += run;
-  }
 }
 
 void Instance::get(const fmi2ValueReference refs[], std::size_t count, double values[]) {

@@ -1,6 +1,7 @@
 // One FMU instance: a simulation, where its variables stand, its state, and its logger.
 #pragma once
 
+#include <algorithm>
 #include <limits>
 #include <memory>
 #include <stdexcept>
@@ -44,6 +45,22 @@ std::string resourcePath(const std::string& location, const char* file);
 
 // Throws ResourceError (also when the file cannot be read, or belongs to another GUID).
 Resource loadResource(const std::string& location, const std::string& guid);
+
+// How many of `count` references ascend by one from the first.
+inline std::size_t runLength(const fmi2ValueReference refs[], std::size_t count) {
+  constexpr std::size_t stride = 16;  // compared at once, without a branch each
+  const std::uint32_t first = refs[0];
+  std::size_t run = 1;
+  if (count == 1 || refs[1] != first + 1) return run;
+  while (run + stride <= count) {
+    std::uint32_t differs = 0;
+    for (std::size_t j = 0; j < stride; ++j) differs |= refs[run + j] ^ (first + static_cast<std::uint32_t>(run + j));
+    if (differs) break;
+    run += stride;
+  }
+  while (run < count && refs[run] == first + run) ++run;
+  return run;
+}
 
 class Instance {
  public:
@@ -102,7 +119,10 @@ class Instance {
   // Calls use(range, first reference, number, index of the first) for each run of consecutive references.
   template <class Use>
   void forRuns(const fmi2ValueReference references[], std::size_t count, Use use) const;
-  std::size_t placeOf(std::uint32_t reference, Causality causality) const;
+  void require(const Range& range, std::uint32_t reference, Causality causality) const;
+  std::size_t inputAt(std::uint32_t reference) const;  // its place
+  void requireOutputs(const fmi2ValueReference references[], std::size_t count) const;
+  void takeScratch(const fmi2ValueReference references[], std::size_t count, double values[]) const;
   void findHostStep();
   void warnOfStep(double step);
 
@@ -119,5 +139,18 @@ class Instance {
   bool warnedOfStep = false;
   std::unordered_map<fmi2FMUstate, std::unique_ptr<SavedState>> savedStates;
 };
+
+template <class Use>
+void Instance::forRuns(const fmi2ValueReference refs[], std::size_t count, Use use) const {
+  if (count > 0 && !refs) throw Refused("the array of value references is a null pointer");
+  for (std::size_t i = 0; i < count;) {
+    const std::uint32_t first = refs[i];
+    const Range& range = rangeOf(first);
+    const std::size_t most = std::min<std::size_t>(count - i, range.end - first);
+    const std::size_t run = runLength(refs + i, most);
+    use(range, first, run, i);
+    i += run;
+  }
+}
 
 }  // namespace tiefmu
