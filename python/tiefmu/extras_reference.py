@@ -5,6 +5,7 @@ import re
 
 import numpy as np
 
+from ._core import Diverged
 from .scene import Scene
 
 MOST_VARIABLES = 2000
@@ -14,7 +15,7 @@ FOLDER = "extra/tiefmu"
 
 
 def reference(scene: Scene, xml: bytes) -> dict[str, bytes]:
-    """reference_in.csv and reference_out.csv, or nothing where they would be large. Row k of the inputs is set at its
+    """reference_in.csv and reference_out.csv, or nothing where they would be large or the run diverges. Row k of the inputs is set at its
     time; row k + 1 of the outputs is what the FMU answers after the step from there to the next time."""
     variables = scene.start.variables
     if sum(len(block["numbers"]) * block["components"] for block in variables) > MOST_VARIABLES:
@@ -32,7 +33,10 @@ def reference(scene: Scene, xml: bytes) -> dict[str, bytes]:
             simulation.initialise(0.0)
         rows.append(simulation.get_values(outputs) if k == 0 else answer)
         if k < STEPS:
-            simulation.step(step)
+            try:
+                simulation.step(step)
+            except Diverged:
+                return {}
             answer = simulation.get_values(outputs)
     return {f"{FOLDER}/reference_in.csv": table(times, list(inputs), np.array(list(inputs.values())).T),
             f"{FOLDER}/reference_out.csv": table(times, outputs, np.array(rows))}
