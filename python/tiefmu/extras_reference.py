@@ -15,8 +15,8 @@ FOLDER = "extra/tiefmu"
 
 
 def reference(scene: Scene, xml: bytes) -> dict[str, bytes]:
-    """reference_in.csv and reference_out.csv, or nothing where they would be large or the run diverges. Row k of the inputs is set at its
-    time; row k + 1 of the outputs is what the FMU answers after the step from there to the next time."""
+    """reference_in.csv and reference_out.csv, or nothing where they would be large or the run diverges. Row k of the
+    inputs is set at its time; row k + 1 of the outputs is what the FMU answers after the step from there to the next."""
     variables = scene.start.variables
     if sum(len(block["numbers"]) * block["components"] for block in variables) > MOST_VARIABLES:
         return {}
