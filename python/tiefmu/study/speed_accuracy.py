@@ -64,7 +64,7 @@ def add_parser(studies):
                         help="inputs over time, as for `tiefmu run` (default: NAME.csv beside NAME.toml, if there)")
     parser.add_argument("--ladder", metavar="N", type=rungs, default=STEPS,
                         help=f"steps of a curve, each half the one before (default: {STEPS}; "
-                        "two fewer for small geometry and the other formulation)")
+                        "two fewer for small geometry, the other formulation and penalties)")
     parser.set_defaults(command=command)
 
 
@@ -154,8 +154,9 @@ class Study:
                                          for key, x in values.items()}))
 
     def rungs(self, variant) -> int:
-        """Two fewer for what is not the scene's own formulation in finite geometry."""
-        return max(2, self.ladder - (2 if (variant.formulation, variant.geometry) != ("scene", "finite") else 0))
+        """Two fewer for what is not the scene's own formulation in finite geometry, and for penalties."""
+        own = (variant.formulation, variant.geometry, variant.penalty) == ("scene", "finite", 0)
+        return max(2, self.ladder - (0 if own else 2))
 
     def rows(self):
         for variant in self.variants:
