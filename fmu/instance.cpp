@@ -233,7 +233,11 @@ std::string Instance::nameOf(std::uint32_t reference) const {
 
 void Instance::get(const fmi2ValueReference refs[], std::size_t count, double values[]) {
   if (count > 0 && !values) throw Refused("the array of values is a null pointer");
-  if (state != error) simulation.updateOutputs();
+  try {
+    simulation.updateOutputs();
+  } catch (const std::exception&) {
+    if (state != error) throw;  // there what still can be read is
+  }
   const double* data = simulation.data();
   forRuns(refs, count, [&](const Range& range, std::uint32_t first, std::size_t run, std::size_t i) {
     copy(data + range.place + (first - range.first), run, values + i);
@@ -274,7 +278,7 @@ void Instance::set(const fmi2ValueReference refs[], std::size_t count, const dou
 }
 
 void Instance::doStep(double point, double step) {
-  if (!(step > 0) || !std::isfinite(step))
+  if (!(step > 0) || !std::isfinite(step) || std::isinf(point + step))
     throw Refused("the step size " + text(step) + " s is not above zero and finite");
   const double allowed = tolerance(clock.time, step);
   if (!(std::abs(point - clock.time) <= allowed))

@@ -190,7 +190,6 @@ struct Simulation::Impl {
   }
   void undo() {
     dynamics.inputs.at(0, data.data());
-    dynamics.inputs.clear();
     std::copy_n(backup.begin(), kept[0].count, data.begin() + kept[0].offset);
     std::copy_n(backup.begin() + kept[0].count, kept[1].count, data.begin() + kept[1].offset);
     flags &= ~accelerationsValid;

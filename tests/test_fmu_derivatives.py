@@ -219,6 +219,19 @@ def test_derivatives_of_inputs_belong_to_the_state(fmu):
     instance.free(), fresh.free()
 
 
+def test_derivatives_of_inputs_outlive_a_refused_step(fmu):
+    outputs, inputs = fmu.names("output"), fmu.names("input")
+    one, other = started(fmu), started(fmu)
+    for instance in (one, other):
+        assert set_derivatives(instance, inputs, [1] * len(inputs), np.linspace(-1, 1, len(inputs))) == OK
+    for size in (0.0, 1e-30, np.nan) + ((1e15,) if "stable_time_step" in outputs else ()):
+        assert one.step(0.01, size) == ERROR
+    for instance in (one, other):
+        assert instance.step(0.01, 0.02) == OK
+    np.testing.assert_array_equal(one.get(outputs), other.get(outputs))
+    one.free(), other.free()
+
+
 def test_wrong_derivatives_of_inputs_change_nothing(fmu):
     outputs = fmu.names("output")
     instance, other = started(fmu), started(fmu)
