@@ -90,17 +90,23 @@ def test_nodal_rule_bounds_the_optimized_formulation(seed):
     assert run["nodal_time_step"] <= run["stable_time_step"] * (1 + 1e-9)
 
 
+# What a stable scheme makes of the energy of its highest mode, at s = 0.9 of the limit: central difference conserves
+# v^2/2 + (1 - s^2) x^2/2, symplectic Euler v^2/2 + x^2/2 - s v x; the others dissipate.
+GROWTH = {"central-difference": 1 / (1 - 0.9**2), "symplectic-euler": 1.9 / 0.1, "noh-bathe": 1.2, "rk4": 1.2}
+
+
 @forms
-@pytest.mark.parametrize("method", ["central-difference", "symplectic-euler", "noh-bathe", "rk4"])
-def test_motion_stays_bounded_near_the_limit(method, formulation, rotations):
-    """0.95 of the limit on small motions; on large ones the frequencies change on the way, and 0.9 is enough."""
-    for safety, speed in ((0.95, 0.05), (0.9, 1.0)):
-        scene = structure(np.random.default_rng(2), formulation, rotations, "consistent", speed=speed)
-        run = Run(scene | {"integrator": {"method": method, "safety": safety}})
-        energy = run["energy.kinetic"] + run["energy.strain"]
-        for _ in range(100):
-            run.step(safety * run.simulation.integrator_limit * 50)
-            assert run["energy.kinetic"] + run["energy.strain"] < 3 * energy
+@pytest.mark.parametrize("method", GROWTH)
+@pytest.mark.parametrize("speed", [0.05, 1.0])
+def test_motion_stays_bounded_near_the_limit(speed, method, formulation, rotations):
+    """At the default safety. Closer to the limit finite rotations with consistent inertia grow slowly in the first two
+    methods, because the frequencies change on the way and the bias is explicit."""
+    scene = structure(np.random.default_rng(2), formulation, rotations, "consistent", speed=speed)
+    run = Run(scene | {"integrator": {"method": method}})
+    energy = run["energy.kinetic"] + run["energy.strain"]
+    for _ in range(100):
+        run.step(0.9 * run.simulation.integrator_limit * 50)
+        assert run["energy.kinetic"] + run["energy.strain"] < GROWTH[method] * energy
 
 
 def test_a_rivet_between_slaves_outside_their_segments():
