@@ -63,7 +63,12 @@ def load(source) -> Scene:
         raw = plain(source) if isinstance(source, dict) else read_toml(Path(source))
         return Scene(file, name, schema.parse(raw), folder)
     except SceneError as error:
-        raise SceneError(f"{file}: {error}") from None
+        raise SceneError(one_line(f"{file}: {error}")) from None
+
+
+def one_line(message: str) -> str:
+    """The same with control characters and the like, which names may hold, written as escapes."""
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in message)
 
 
 def plain(value):
