@@ -20,6 +20,12 @@ inline std::uint64_t takeNumber(std::string_view& in, int bytes) {
   return value;
 }
 
+#ifdef FUZZING_BUILD_MODE_UNSAFE_FOR_PRODUCTION
+constexpr bool checksums = false;
+#else
+constexpr bool checksums = true;
+#endif
+
 // Bytes from outside as they may stand in a message.
 inline std::string printable(std::string bytes) {
   for (char& c : bytes)

@@ -8,6 +8,7 @@ import pytest
 import tiefmu
 from conftest import toml
 from tiefmu.cli import main
+from tiefmu.schema import ARRAYS, TABLES, SceneTables
 
 MISSING = object()
 
@@ -194,6 +195,257 @@ CASES = {
     # mesh file
     "no such mesh file": (("mesh", "file"), "panel.inp", "mesh: file: panel.inp: no such file"),
 }
+
+
+# ------------------------------------------------------------------------------------- every key, wrong in every way
+
+def one_of(*names) -> list:
+    names = ", ".join(f"'{name}'" for name in names)
+    return [(value, f"{shown} is not one of {names}") for value, shown in
+            (("", "''"), ("x", "'x'"), (1, "1"), (True, "true"), ([], "[]"), ({}, "a table"))]
+
+
+TEXT = [(5, "expected a text, found 5"), (True, "expected a text, found true"), (["a"], "expected a text, found ['a']"),
+        ({}, "expected a text, found a table"), ("a\x00", "holds a character that cannot be printed, U+0000"),
+        ("\u2028", "holds a character that cannot be printed, U+2028")]
+NAME = TEXT + [("", "is empty"), ("a\nb", "holds a character that cannot be printed, U+000A")]
+FLAG = [(1, "expected true or false, found 1"), ("yes", "expected true or false, found 'yes'")]
+FINITE = [("1", "expected a number, found '1'"), (True, "expected a number, found true"),
+          ([1.0], "expected a number, found [1.0]"), ({}, "expected a number, found a table"),
+          (NAN, "nan is not a finite number"), (INF, "inf is not a finite number"),
+          (1e31, "1e+31 is too large; it must be at most 1e+30"),
+          (10**400, f"1{'0' * 36}... is too large; it must be at most 1e+30")]
+NUMBER = FINITE + [(-1e-3, "-0.001 is negative; it must be 0 or more")]
+POSITIVE = FINITE + [(0, "0 is too small; it must be more than 0"), (-1, "-1 is too small; it must be more than 0")]
+VECTOR = [(value, f"expected [x, y, z], found {shown}") for value, shown in
+          ((1.0, "1.0"), ("x", "'x'"), ([], "[]"), ([1, 2], "[1, 2]"), ([1, 2, 3, 4], "[1, 2, 3, 4]"),
+           ([1, 2, True], "[1, 2, true]"), ({}, "a table"))] + \
+    [([0, -INF, 0], "-inf is not a finite number"), ([0, 0, -1e40], "-1e+40 is too large; it must be at most 1e+30")]
+NUMBER_OR_VECTOR = [(value, f"expected a number or [x, y, z], found {shown}") for value, shown in
+                    (("x", "'x'"), (True, "true"), ([], "[]"), ([1, 2], "[1, 2]"), ([1, 2, "3"], "[1, 2, '3']"))] + \
+    [(-1, "-1 is negative; it must be 0 or more"), ([1, -2, 3], "-2 is negative; it must be 0 or more"),
+     (NAN, "nan is not a finite number"), ([1e50, 0, 0], "1e+50 is too large; it must be at most 1e+30")]
+NODES = [(value, f"expected a list of ids, a set name or 'all', found {shown}") for value, shown in
+         ((5, "5"), (1.5, "1.5"), (True, "true"), ({}, "a table"))] + \
+    [([], "the list is empty; give at least one id"), ("", "the name of the set is empty"),
+     ([1, 1], "id 1 is repeated"), ([999], f"node 999 {NOT_FOUND}"), ([2**63], f"{IDS}, found {2**63}"),
+     ([-1], f"{IDS}, found -1"), ([0], f"{IDS}, found 0"), (["1"], f"{IDS}, found '1'"), ([[1]], f"{IDS}, found [1]"),
+     ("a\nb", "the mesh has no set 'a\\nb'; it has no sets of nodes: give ids or 'all'")]
+SEGMENTS = [(value, line.replace("node 999", "segment 999").replace("1..101", "1..1").replace("sets of nodes",
+                                                                                          "sets of segments"))
+            for value, line in NODES]
+TABLE = [(value, f"expected a table, found {shown}") for value, shown in
+         ((5, "5"), ("x", "'x'"), (True, "true"), ([1], "[1]"))]
+LIST = [(value, f"expected a list, found {shown}") for value, shown in
+        ((5, "5"), ("x", "'x'"), (True, "true"), ({}, "a table"))]
+NAMES = LIST + [([3], "entry 1: expected a text, found 3"), ([["v"]], "entry 1: expected a text, found ['v']")]
+
+
+def tables(name: str) -> list:
+    return [(value, f"expected tables written [[{name}]], found {shown}") for value, shown in
+            ((5, "5"), ("x", "'x'"), ({}, "a table"))]
+
+
+KEYS = {
+    ("title",): TEXT,
+    ("units",): TABLE,
+    ("units", "length"): one_of("m", "cm", "mm", "um", "km", "in", "ft"),
+    ("units", "mass"): one_of("kg", "g", "mg", "t", "lb"),
+    ("units", "time"): one_of("s", "ms", "us", "min"),
+    ("mesh",): TABLE,
+    ("mesh", "file"): NAME,
+    ("mesh", "nodes"): LIST,
+    ("mesh", "segments"): LIST,
+    ("node",): tables("node"),
+    ("node", 0, "nodes"): NODES,
+    ("node", 0, "motion"): one_of("driven", "free", "fixed"),
+    ("node", 0, "rotations"): FLAG,
+    ("node", 0, "mass"): NUMBER,
+    ("node", 0, "inertia"): NUMBER,
+    ("node", 0, "stiffness"): NUMBER,
+    ("node", 0, "rotational_stiffness"): NUMBER,
+    ("tie",): tables("tie"),
+    ("tie", 0, "name"): NAME,
+    ("tie", 0, "segments"): SEGMENTS,
+    ("tie", 0, "slaves"): NODES,
+    ("tie", 0, "formulation"): one_of("default", "optimized"),
+    ("tie", 0, "search"): one_of("box", "nearest-node"),
+    ("tie", 0, "search_distance"): NUMBER,
+    ("tie", 0, "unresolved"): one_of("error", "drop"),
+    ("spring",): tables("spring"),
+    ("spring", 0, "ground"): NODES,
+    ("spring", 0, "kind"): one_of("axial", "bushing"),
+    ("spring", 0, "stiffness"): NUMBER_OR_VECTOR,
+    ("spring", 0, "damping"): NUMBER_OR_VECTOR,
+    ("spring", 0, "rotational_stiffness"): NUMBER_OR_VECTOR,
+    ("spring", 0, "rotational_damping"): NUMBER_OR_VECTOR,
+    ("initial",): tables("initial"),
+    ("initial", 0, "nodes"): NODES,
+    ("initial", 0, "v"): VECTOR,
+    ("initial", 0, "w"): VECTOR,
+    ("model",): TABLE,
+    ("model", "inertia"): one_of("lumped", "consistent"),
+    ("model", "reaction"): one_of("loads", "full", "split"),
+    ("model", "geometry"): one_of("finite", "small"),
+    ("model", "position"): one_of("integrated", "input"),
+    ("model", "gravity"): VECTOR,
+    ("integrator",): TABLE,
+    ("integrator", "method"): one_of("central-difference", "symplectic-euler", "noh-bathe", "rk4"),
+    ("integrator", "time_step"): NUMBER,
+    ("integrator", "safety"): POSITIVE,
+    ("interface",): TABLE,
+    ("interface", "expose"): NAMES,
+    ("interface", "hide"): NAMES,
+}
+
+
+def test_all_keys_are_in_the_table():
+    """Of `spring`, `nodes` has cases of its own above."""
+    keys = {(table,) for table in SceneTables.model_fields}
+    for name, model in TABLES.items():
+        keys |= {(name, 0, key) if name in ARRAYS else (name, key) for key in model.model_fields}
+    assert set(KEYS) == keys - {("spring", 0, "nodes")}
+
+
+@pytest.mark.parametrize("path", KEYS, ids=lambda path: ".".join(map(str, path)))
+def test_wrong_value(path, weld):
+    """A dict: what is said does not depend on where the scene came from, as the cases above show."""
+    weld |= {"spring": [{"ground": [1], "kind": "bushing"}], "initial": [{"nodes": [1], "v": [0, 0, 0]}]}
+    head = {"node": "node table 1", "tie": "tie 'weld'", "spring": "spring 1", "initial": "initial 1"}
+    for value, line in KEYS[path]:
+        where = ": ".join([head.get(path[0], path[0]), *path[2:]] if len(path) == 3 else path)
+        if path == ("tie", 0, "name"):
+            where = "tie 1: name" if not isinstance(value, str) or not value else f"tie '{escaped(value)}': name"
+        with pytest.raises(tiefmu.SceneError) as error:
+            tiefmu.load(changed(weld, path, value))
+        assert str(error.value) == f"scene: {where}: {line}"
+
+
+def escaped(name: str) -> str:
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in name)
+
+
+# --------------------------------------------------------------------------------------------------------------- meshes
+
+QUAD = [[1, 0, 0, 0], [2, 0.1, 0, 0], [3, 0.1, 0.1, 0], [4, 0, 0.1, 0], [101, 0.03, 0.06, 0.04]]
+NO_AREA = "it lies outside every segment by more than half its size; without area and passed over: segment 1"
+NEEDLE = QUAD[:2] + [[3, 0.1, 1e-9, 0], [4, 0, 1e-9, 0], [101, 0.03, 0, 0.04]]
+
+# name: (nodes, segments, keys of the tie, line)
+MESHES = {
+    "bow-tie": (QUAD, [[1, 1, 3, 2, 4]], {},
+                f"tie 'weld': slave 101: no segment found within search_distance 0.122474 m; {NO_AREA}"),
+    "bow-tie, nearest node": (QUAD, [[1, 1, 2, 4, 3]], {"search": "nearest-node"},
+                              "tie 'weld': slave 101: no segment found at its nearest master node in the box of side "
+                              f"search_distance 0.122474 m; {NO_AREA}"),
+    "folded quad": (QUAD[:2] + [[3, 0.1, 0, 0], [4, 0, 0, 0]] + QUAD[4:], [[1, 1, 2, 3, 4]], {},
+                    f"tie 'weld': slave 101: no segment found within search_distance 0.0707107 m; {NO_AREA}"),
+    "collinear triangle": (QUAD[:2] + [[3, 0.2, 0, 0], [101, 0.03, 0, 0.04]], [[1, 1, 2, 3]], {},
+                           f"tie 'weld': slave 101: no segment found within search_distance 0.141421 m; {NO_AREA}"),
+    "all nodes in one place": ([[i, 1, 1, 1] for i in (1, 2, 3, 4, 101)], [[1, 1, 2, 3, 4]], {},
+                               f"tie 'weld': slave 101: no segment found within search_distance 0 m; {NO_AREA}"),
+    "needle that cannot hold a rotation": (NEEDLE, [[1, 1, 2, 3, 4]], {"formulation": "optimized"},
+                                           "tie 'weld': segment 1: cannot hold slave 101: its nodes are collinear "
+                                           "(cond(Ibar) = 5.76461e+15, at most 1e12), which leaves the rotation about "
+                                           "them open"),
+    "needle out of the box": (NEEDLE, [[1, 1, 2, 3, 4]], {"search": "nearest-node"},
+                              "tie 'weld': slave 101: no segment found at its nearest master node in the box of side "
+                              "search_distance 0.0707107 m; the nearest is segment 1 at 0.04 m"),
+    "slaves beside the masters": (QUAD[:4] + [[101, 10, 10, 0]], [[1, 1, 2, 3, 4]], {},
+                                  "tie 'weld': slave 101: no segment found within search_distance 0.1 m; it lies "
+                                  "outside every segment by more than half its size"),
+    "slaves far above the masters": (QUAD[:4] + [[101, 0.05, 0.05, 10]], [[1, 1, 2, 3, 4]], {},
+                                     "tie 'weld': slave 101: no segment found within search_distance 0.1 m; the "
+                                     "nearest is segment 1 at 10 m"),
+    "repeated node": (QUAD + [[3, 1, 1, 1]], [[1, 1, 2, 3, 4]], {}, "mesh: node 3 is repeated"),
+    "missing node": (QUAD[:3] + QUAD[4:], [[1, 1, 2, 3, 4]], {}, f"mesh: segment 1: node 4 {NOT_FOUND}"),
+    "node id of a segment is zero": (QUAD, [[1, 1, 2, 3, 0]], {},
+                                     "mesh: segment 1: node 4: 0 is too small; it must be at least 1"),
+    "segment id is negative": (QUAD, [[-4, 1, 2, 3, 4]], {},
+                               "mesh: segments: row 1: id: -4 is too small; it must be at least 1"),
+    "segment id is too large": (QUAD, [[2**63, 1, 2, 3, 4]], {}, "mesh: segments: row 1: id: 9223372036854775808 is "
+                                "too large; it must be at most 9.22337e+18"),
+    "node too far away": ([[1, 0, 0, 1e200]] + QUAD[1:], [[1, 1, 2, 3, 4]], {},
+                          "mesh: node 1: z: 1e+200 is too large; it must be at most 1e+30"),
+    "node too far away on the other side": ([[1, 0, -1e31, 0]] + QUAD[1:], [[1, 1, 2, 3, 4]], {},
+                                            "mesh: node 1: y: -1e+31 is too small; it must be at least -1e+30"),
+}
+
+
+@pytest.mark.parametrize("name", MESHES)
+def test_mesh(name, weld, scene_file, capsys):
+    nodes, segments, keys, line = MESHES[name]
+    weld["mesh"] = {"nodes": nodes, "segments": segments}
+    weld["tie"][0] |= keys
+    assert line_of(scene_file, capsys, weld) == line
+
+
+@pytest.mark.parametrize("segments", [[[1, 4, 3, 2, 1]], [[1, 1, 2, 3, 4], [2, 4, 3, 2, 1]]],
+                         ids=["inverted", "inverted twin"])
+def test_the_sense_of_a_segment_is_free(segments, weld):
+    """No broken scene: a tie has no inside, so that an inverted segment moves its slaves as the other does."""
+    weld["tie"][0]["formulation"] = "optimized"
+    straight = tiefmu.report(tiefmu.load(weld))
+    weld["mesh"]["segments"] = segments
+    inverted = tiefmu.report(tiefmu.load(weld))
+    assert inverted["warnings"] == straight["warnings"] == []
+    assert sorted(map(repr, inverted["slaves"][0]["weights"])) == sorted(map(repr, straight["slaves"][0]["weights"]))
+
+
+def test_segments_without_area_are_named_where_others_hold_the_slaves(weld):
+    weld["mesh"]["segments"].append([2, 1, 3, 2, 4])
+    assert "tie 'weld': segment 2: has no area (its nodes coincide, are collinear or fold onto each other); passed over" \
+        in tiefmu.report(tiefmu.load(weld))["warnings"]
+
+
+def test_chain_of_ties(weld, scene_file, capsys):
+    """The slave of one tie as the master of another, and the two as each other's masters."""
+    weld["mesh"]["nodes"] += [[102, 0.03, 0.05, 0.05], [103, 0.05, 0.05, 0.05], [104, 0.03, 0.05, 0.06]]
+    weld["mesh"]["segments"].append([2, 101, 102, 103])
+    weld["tie"][0]["segments"] = [1]
+    weld["tie"].append({"name": "glue", "segments": [2], "slaves": [104]})
+    assert line_of(scene_file, capsys, weld) == \
+        "tie 'weld': slave 101: is also a master, on segment 2 of tie 'glue'; take it out of one of them"
+    weld["tie"][1]["slaves"] = [4]
+    weld["tie"][0]["slaves"] = [103]
+    assert line_of(scene_file, capsys, weld) == \
+        "tie 'glue': slave 4: is also a master, on segment 1 of tie 'weld'; take it out of one of them"
+
+
+def test_slaves_are_masters_too(weld, scene_file, capsys):
+    weld["tie"][0]["slaves"] = "all"
+    assert line_of(scene_file, capsys, weld) == \
+        "tie 'weld': slave 1: is also a master, on segment 1 of tie 'weld'; take it out of one of them"
+
+
+def test_free_node_that_turns_without_inertia(weld, scene_file, capsys):
+    weld["mesh"]["nodes"].append([5, 1, 1, 1])
+    weld["node"].append({"nodes": [5], "motion": "free", "rotations": True, "mass": 1.0})
+    weld["spring"] = [{"ground": [5], "kind": "bushing", "stiffness": 1.0}]
+    assert line_of(scene_file, capsys, weld) == "node 5: is free but has no inertia of its own and gets none from its " \
+        "slaves; give it inertia, or rotations = false"
+
+
+def test_spring_on_free_node_without_mass(weld, scene_file, capsys):
+    weld["mesh"]["nodes"].append([5, 1, 1, 1])
+    weld["node"].append({"nodes": [5], "motion": "free", "mass": 0.0})
+    weld["spring"] = [{"nodes": [5, 101], "stiffness": 1.0}]
+    assert line_of(scene_file, capsys, weld) == \
+        "node 5: is free but has no mass of its own and gets none from its slaves; give it mass"
+
+
+def test_torsion_on_what_cannot_turn(weld, scene_file, capsys):
+    weld["spring"] = [{"nodes": [101, 1], "kind": "bushing", "rotational_stiffness": 1.0}]
+    assert line_of(scene_file, capsys, weld) == "spring 1: slave 101 cannot take a moment: the nodes of segment 1 of " \
+        "tie 'weld' have no rotations; use formulation = \"optimized\""
+
+
+@pytest.mark.parametrize("file, line", [("..", "no such file"), ("a" * 300, "File name too long")])
+def test_mesh_files_that_are_none(file, line, weld):
+    weld["mesh"] = {"file": file}
+    with pytest.raises(tiefmu.SceneError) as error:
+        tiefmu.load(weld)
+    assert str(error.value) == f"scene: mesh: file: {file}: {line}"
 
 
 @pytest.mark.parametrize("name", CASES)

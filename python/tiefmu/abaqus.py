@@ -8,11 +8,13 @@ import re
 from pathlib import Path
 
 from ._core import SceneError
+from .schema import shortened
 
 # Three- and four-node elements that are surfaces: shells, membranes, surface, rigid and plane elements. The digit
 # behind the family's name counts the nodes.
 SURFACE = re.compile(r"(STRI|SFM3D|M3D|R3D|CPS|CPEG|CPE|CAX|DS|DC2D|S)(\d)")
 # Keywords that make nodes or elements, or move them, without listing them.
+MOST = 10**8  # ids in a generated set
 GENERATORS = {"NGEN", "NFILL", "NCOPY", "NMAP", "ELGEN", "ELCOPY", "SYSTEM"}
 
 
@@ -63,7 +65,7 @@ class InputFile:
         for line in lines:
             number, *rest = line.rstrip(",").split(",")
             position = [float(item) if item.strip() else 0.0 for item in rest[:3]]
-            add(self.nodes, int(number), position + [0.0] * (3 - len(position)), "node")
+            add(self.nodes, whole(number), position + [0.0] * (3 - len(position)), "node")
             ids.append(int(number))
         if "NSET" in options:
             self.node_sets.setdefault(options["NSET"], []).extend(ids)
@@ -89,12 +91,14 @@ class InputFile:
         for line in lines:
             items = [item.strip() for item in line.split(",") if item.strip()]
             if "GENERATE" in options:
-                first, last, *step = map(int, items)
+                first, last, *step = map(whole, items)
+                if last - first > MOST:
+                    raise SceneError(f"set '{name}': {first} to {last} is more than a file can hold")
                 members.extend(range(first, last + 1, *step))
                 continue
             for item in items:
                 if item.isdigit():
-                    members.append(int(item))
+                    members.append(whole(item))
                 elif item in sets:
                     members.extend(sets[item])
                 else:
@@ -111,6 +115,14 @@ def parse_keyword(line: str) -> tuple[str, dict]:
     return keyword.strip().upper(), options
 
 
+def whole(text: str) -> int:
+    """An id, or the step between ids."""
+    number = int(text)
+    if not 1 <= number < 2**63:
+        raise SceneError(f"{shortened(text.strip())} is no id; ids are whole numbers from 1")
+    return number
+
+
 def records(lines: list[str], count: int | None):
     """Element records [id, nodes...]: of `count` nodes, or (None) continued where a line ends with a comma."""
     record = []
@@ -121,7 +133,7 @@ def records(lines: list[str], count: int | None):
         return record
 
     for line in lines:
-        record += [int(item) for item in line.split(",") if item.strip()]
+        record += [whole(item) for item in line.split(",") if item.strip()]
         if len(record) > count if count else not line.endswith(","):
             yield checked()
             record = []

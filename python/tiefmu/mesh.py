@@ -17,6 +17,7 @@ import numpy as np
 
 from . import abaqus
 from ._core import SceneError
+from .schema import LARGEST
 
 QUADRATIC = {"triangle6", "triangle7", "quad8", "quad9"}
 CORNERS = {"triangle": 3, "quad": 4}
@@ -46,6 +47,8 @@ class Mesh:
         """Appends segments: ids (n), node_ids (n, 4) with 0 as a triangle's fourth."""
         node_ids = np.asarray(node_ids, np.int64).reshape(-1, 4)
         ids = np.asarray(ids, np.int64)
+        if ids.min(initial=1) < 1:
+            raise SceneError(f"segment {ids.min()}: ids start at 1")
         nodes = find(self.node_id, node_ids)
         missing = np.argwhere((nodes < 0) & (node_ids != 0))
         if len(missing):
@@ -104,9 +107,9 @@ def build(table, folder: Path) -> Mesh:
 
 def read_into(mesh: Mesh, path: Path, name: str):
     """Reads the file into the empty mesh; `name` is how messages call it."""
-    if not path.is_file():
-        raise SceneError(f"file: {name}: no such file")
     try:
+        if not path.is_file():
+            raise SceneError("no such file")
         if path.suffix.lower() == ".inp":
             read_abaqus(mesh, path)
         else:
@@ -114,6 +117,11 @@ def read_into(mesh: Mesh, path: Path, name: str):
         bad = np.flatnonzero(~np.isfinite(mesh.position).all(axis=1))
         if len(bad):
             raise SceneError(f"node {mesh.node_id[bad[0]]}: a coordinate is not a finite number")
+        bad = np.flatnonzero((abs(mesh.position) > LARGEST).any(axis=1))
+        if len(bad):
+            raise SceneError(f"node {mesh.node_id[bad[0]]}: a coordinate is too large; it must be at most {LARGEST:g}")
+    except OSError as error:
+        raise SceneError(f"file: {name}: {error.strerror or error}") from None
     except SceneError as error:
         raise SceneError(f"file: {name}: {error}") from None
 
@@ -154,6 +162,8 @@ def read_meshio(mesh: Mesh, path: Path, name: str):
     quadratic = next((block.type for block in read.cells if block.type in QUADRATIC), None)
     if quadratic:
         raise SceneError(f"its '{quadratic}' elements are quadratic; segments need linear triangles and quads")
+    if read.points.ndim != 2 or not 1 <= read.points.shape[1] <= 3:
+        raise SceneError("meshio cannot read it: its points have no coordinates x, y, z")
     position = np.zeros((len(read.points), 3))
     position[:, :read.points.shape[1]] = read.points[:, :3]
     counts = {kind: sum(len(block.data) for block in read.cells if block.type == kind) for kind in CORNERS}

@@ -69,10 +69,27 @@ def selection(value: Any) -> str | list[int]:
     return value
 
 
+LARGEST = 1e30  # products of lengths, up to the eighth power in the inertia of a segment, stay finite
+
+
 def finite(value: float) -> float:
     if not abs(value) <= sys.float_info.max:
         raise wrong(f"{found(value)} is not a finite number")
+    if abs(value) > LARGEST:
+        raise wrong(f"{value:g} is too large; it must be at most {LARGEST:g}")
     return value
+
+
+def printable(value: str, also: str = "") -> str:
+    """Refuses what could neither be shown nor be written to XML."""
+    odd = next((c for c in value if not c.isprintable() and c not in also), None)
+    if odd is not None:
+        raise wrong(f"holds a character that cannot be printed, U+{ord(odd):04X}")
+    return value
+
+
+def text(value: str) -> str:
+    return printable(value, also="\t\n")
 
 
 def not_negative(value: float) -> float:
@@ -103,8 +120,11 @@ def two_nodes(value: Any) -> list[int]:
 
 
 Id = Annotated[int, Field(ge=1, le=2**63 - 1)]
-Positive = Annotated[float, Field(gt=0)]
-NotNegative = Annotated[float, AfterValidator(not_negative)]
+Coordinate = Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
+Positive = Annotated[float, Field(gt=0, le=LARGEST)]
+NotNegative = Annotated[float, Field(le=LARGEST), AfterValidator(not_negative)]
+Text = Annotated[str, AfterValidator(text)]
+Name = Annotated[str, Field(min_length=1), AfterValidator(printable)]
 NotNegativeVector = Annotated[Any, PlainValidator(number_or_vector)]
 Vector = Annotated[Any, PlainValidator(vector)]
 TwoNodes = Annotated[Any, PlainValidator(two_nodes)]
@@ -123,8 +143,8 @@ class Units(Table):
 
 
 class Mesh(Table):
-    file: str | None = None
-    nodes: list[Annotated[tuple[Id, float, float, float], Field(strict=False)]] = []
+    file: Name | None = None
+    nodes: list[Annotated[tuple[Id, Coordinate, Coordinate, Coordinate], Field(strict=False)]] = []
     segments: list[Annotated[list[Id], Field(min_length=4, max_length=5)]] = []
 
 
@@ -139,7 +159,7 @@ class Node(Table):
 
 
 class Tie(Table):
-    name: Annotated[str, Field(min_length=1)] | None = None  # None: its number
+    name: Name | None = None  # None: its number
     segments: Selection = "all"
     slaves: Selection
     formulation: Literal["default", "optimized"] = "default"
@@ -206,7 +226,7 @@ class Interface(Table):
 
 class SceneTables(Table):
     """A whole scene file."""
-    title: str = ""
+    title: Text = ""
     units: Units = Units()
     mesh: Mesh
     node: list[Node] = []
@@ -293,6 +313,8 @@ def explain(error: dict) -> str:
         return f"{found(value)} is not one of {context['expected'].replace(' or ', ', ')}"
     if kind == "finite_number":
         return f"{value} is not a finite number"
+    if kind == "float_type" and type(value) is int:
+        return f"{found(value)} is too large; it must be at most {LARGEST:g}"
     if kind == "list_type" and error["loc"][-1] in ARRAYS:
         return f"expected tables written [[{error['loc'][-1]}]], found {found(value)}"
     if kind in EXPECTED:

@@ -2,30 +2,59 @@
 //
 //   tiefmu_calls states|failures|threads FOLDER...
 //   tiefmu_calls leaks COUNT FOLDER...
-//   tiefmu_calls sequences COUNT FIRST FOLDER...      FIRST COUNT 1 repeats one sequence
+//   tiefmu_calls sequences COUNT FIRST FOLDER...      COUNT 1: repeats one sequence
+//   tiefmu_calls resources FILE...                    what the fuzzers start from, and what they found once
+//   tiefmu_calls serialised SCENE FILE...
 //
 // FOLDER: of a packed scene's scene.bin. Exit status 1 and one line on stderr: a defect.
 #include <cstdlib>
+#include <fstream>
+#include <iterator>
 
+#include "../fuzz/inputs.hpp"
 #include "tests.hpp"
 
+namespace {
+
+std::string contents(const std::string& path) {
+  std::ifstream stream(path, std::ios::binary);
+  require(stream.good(), path + ": cannot be read");
+  return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
+}
+
+}  // namespace
+
 int main(int count, char** words) {
-  const std::vector<std::string> arguments(words + 1, words + count);
-  require(!arguments.empty(), "no test named");
-  const std::string test = arguments[0];
-  const std::size_t numbers = test == "sequences" ? 2 : test == "leaks" ? 1 : 0;
-  require(arguments.size() > 1 + numbers, "too few arguments");
-  const auto number = [&](std::size_t i) { return std::atol(arguments[i].c_str()); };
-  const std::vector<Packed> packed(arguments.begin() + 1 + static_cast<std::ptrdiff_t>(numbers), arguments.end());
-  if (test == "sequences") {
-    testSequences(packed, number(1), number(2));
-  } else if (test == "threads") {
-    testThreads(packed);
-  } else {
+  std::vector<std::string> arguments(words + 1, words + count);
+  const auto next = [&] {
+    require(!arguments.empty(), "too few arguments");
+    const std::string first = arguments.front();
+    arguments.erase(arguments.begin());
+    return first;
+  };
+  const auto number = [&] { return std::atol(next().c_str()); };
+  const std::string test = next();
+  if (test == "resources" || test == "serialised") {
+    const std::string scene = test == "serialised" ? next() : "";
+    for (const std::string& file : arguments) {
+      const std::string bytes = contents(file);
+      const auto* data = reinterpret_cast<const unsigned char*>(bytes.data());
+      const bool taken = scene.empty() ? takeResource(data, bytes.size()) : takeState(scene, data, bytes.size());
+      const bool found = file.find("found_") != std::string::npos;  // by a fuzzer: need not be taken, only survived
+      require(taken || found, file + ": refused; run tests/fuzz/make_corpus.py again");
+    }
+    return 0;
+  }
+  const long amount = test == "sequences" || test == "leaks" ? number() : 0;
+  const long first = test == "sequences" ? number() : 0;
+  require(!arguments.empty(), "no folder");
+  const std::vector<Packed> packed(arguments.begin(), arguments.end());
+  if (test == "sequences") testSequences(packed, amount, first);
+  else if (test == "threads") testThreads(packed);
+  else
     for (const Packed& p : packed)
       if (test == "states") testStates(p);
       else if (test == "failures") testFailures(p);
-      else if (test == "leaks") testLeaks(p, number(1));
+      else if (test == "leaks") testLeaks(p, amount);
       else fail("no test '" + test + "'");
-  }
 }

@@ -1,0 +1,70 @@
+"""The FMU's functions in a program of their own (tests/calls), built with sanitizers: the first report ends it.
+
+The builds stay in build/sanitizers and build/threads. More sequences: `make sanitize`.
+"""
+
+import csv
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import tiefmu
+from fmu_scenes import ALL_FREE, DRIVEN, MIXED, scene
+
+ROOT = Path(__file__).resolve().parents[1]
+SEQUENCES = int(os.environ.get("TIEFMU_SEQUENCES", 2000))
+NEVER_ALLOWED = {"fmi2" + name for name in (
+    "CancelStep", "EnterEventMode", "NewDiscreteStates", "EnterContinuousTimeMode", "CompletedIntegratorStep",
+    "SetTime", "SetContinuousStates", "GetDerivatives", "GetEventIndicators", "GetContinuousStates",
+    "GetNominalsOfContinuousStates")}
+
+
+def program(preset: str) -> Path:
+    bin = Path(sys.executable).parent
+    settings = {"cwd": ROOT, "env": os.environ | {"PATH": f"{bin}{os.pathsep}{os.environ['PATH']}"},
+                "capture_output": True, "text": True}
+    for command in ([bin / "cmake", "--preset", preset, f"-DPython_EXECUTABLE={sys.executable}"],
+                    [bin / "cmake", "--build", "--preset", preset, "-j1"]):
+        done = subprocess.run(command, **settings)
+        assert done.returncode == 0, done.stdout + done.stderr
+    return ROOT / "build" / preset / "tiefmu_calls"
+
+
+@pytest.fixture
+def folders(tmp_path) -> list[Path]:
+    """Packed scenes, as the FMU finds them."""
+    found = []
+    for name, settings in (("mixed", MIXED), ("free", ALL_FREE), ("driven", DRIVEN)):
+        found.append(tmp_path / name)
+        found[-1].mkdir()
+        model = tiefmu.load(scene(np.random.default_rng(1), *settings)).model
+        (found[-1] / "scene.bin").write_bytes(model.resource(f"{{{name}}}"))
+    return found
+
+
+def run(program: Path, *arguments) -> str:
+    done = subprocess.run([program, *map(str, arguments)], capture_output=True, text=True)
+    assert done.returncode == 0, f"{program.name} {' '.join(map(str, arguments))}: {done.stderr[-4000:]}"
+    return done.stdout
+
+
+def test_addresses_and_undefined_behaviour(folders):
+    calls = program("sanitizers")
+    run(calls, "states", *folders)
+    run(calls, "failures", *folders)
+    run(calls, "leaks", 1000, *folders)
+    table = list(csv.DictReader(run(calls, "sequences", SEQUENCES, 1, *folders).splitlines()))
+    assert len(table) == 40
+    for row in table:  # sequences that get nowhere would prove nothing
+        assert (int(row["good"]) > 0) == (row["function"] not in NEVER_ALLOWED), row
+        assert (int(row["refused"]) > 0) == (row["function"] != "fmi2Reset"), row
+    if SEQUENCES > 2000:
+        print(*(",".join(row.values()) for row in table), sep="\n")
+
+
+def test_two_instances_in_two_threads(folders):
+    run(program("threads"), "threads", *folders)
