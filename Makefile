@@ -2,6 +2,8 @@
 # make test   set everything up, with the tools below, run all tests
 # make tools  install other people's tools that the tests run FMUs in
 # make study  measure speed, accuracy and stability, write charts and tables to docs/study/
+# make sanitize  100,000 random sequences of calls under sanitizers (make test: 2,000)
+# make fuzz   60 s of fuzzing of resources, serialised states and scene files
 # make bench  time the kernels and the FMU calls, write bench/latest.csv
 PYTHON ?= python3
 VENV := .venv
@@ -12,7 +14,7 @@ SOURCES := CMakeLists.txt $(wildcard src/*.?pp modelDescription/*.?pp fmu/*.?pp 
 # Each set in an environment of its own; not compiled ahead, as most of their files are never imported.
 TOOLS := build/tools/importers/installed build/tools/cofmupy/installed
 
-.PHONY: demo test tools study bench clean
+.PHONY: demo test tools study sanitize fuzz bench clean
 demo: $(VENV)/installed
 	$(BIN)/tiefmu demo --out out
 
@@ -24,6 +26,23 @@ study: $(VENV)/installed
 	$(BIN)/tiefmu study coupling scenes/heavy_slave.toml scenes/spotweld.toml --out docs/study
 	$(BIN)/tiefmu study stability --out docs/study
 	cp docs/study/speed-accuracy-bracket.svg docs/speed-accuracy.svg
+
+SEQUENCES ?= 100000
+sanitize: $(VENV)/installed
+	TIEFMU_SEQUENCES=$(SEQUENCES) $(BIN)/python -m pytest -s tests/test_sanitizers.py
+
+# Clang brings libFuzzer.
+CLANG ?= clang++
+FUZZ_SECONDS ?= 20
+fuzz: $(VENV)/installed
+	PATH=$(abspath $(BIN)):$$PATH cmake --preset fuzz -DCMAKE_CXX_COMPILER=$(CLANG) -DPython_EXECUTABLE=$(abspath $(BIN)/python)
+	PATH=$(abspath $(BIN)):$$PATH cmake --build --preset fuzz
+	for input in resource state; do \
+	  mkdir -p build/fuzz/$$input && TIEFMU_FUZZ_SCENE=tests/fuzz/scene.bin build/fuzz/fuzz_$$input -timeout=20 \
+	    -max_len=8192 -max_total_time=$(FUZZ_SECONDS) -artifact_prefix=build/fuzz/found_ build/fuzz/$$input \
+	    tests/fuzz/corpus/$$input || exit 1; \
+	done
+	$(BIN)/python tests/fuzz/scenes.py --seconds $(FUZZ_SECONDS) --first $$(date +%s)
 
 bench: $(VENV)/installed
 	$(BIN)/python bench/run.py

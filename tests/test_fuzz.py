@@ -1,0 +1,22 @@
+"""What the fuzzers start from, and some thousand broken scenes. More of everything: `make fuzz`."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import tiefmu
+
+FUZZ = Path(__file__).resolve().parent / "fuzz"
+
+
+@pytest.mark.parametrize("path", sorted((FUZZ / "corpus" / "scene").glob("*.toml")), ids=lambda path: path.stem)
+def test_corpus_of_scenes_is_whole(path):
+    assert len(tiefmu.report(tiefmu.load(path))["slaves"]) > 0
+
+
+def test_broken_scenes_are_refused_in_one_line():
+    done = subprocess.run([sys.executable, str(FUZZ / "scenes.py"), "--count", "2000"], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout == "2000 variants\n"
