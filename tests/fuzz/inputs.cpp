@@ -32,7 +32,7 @@ double shortStep(const tiefmu::Model& model) {
     simulation.initialise(0);
     const double asked = model.settings.timeStep > 0 ? model.settings.timeStep : 1e30;
     return std::min({0.01, 100 * asked, 100 * model.settings.safety * simulation.integratorLimit()});
-  } catch (const tiefmu::SceneError&) {
+  } catch (const std::runtime_error&) {
     return 0.01;
   }
 }
@@ -44,14 +44,16 @@ void use(fmi2Component c, std::size_t variables, double step) {
   std::vector<double> values(variables, 0.125), changes(variables);
   for (double time : {0.0, step}) {
     for (fmi2ValueReference r : references) fmi2SetReal(c, &r, 1, values.data());
-    for (fmi2ValueReference r : references)
-      fmi2GetDirectionalDerivative(c, references.data(), 1, &r, 1, values.data(), changes.data());
+    for (std::size_t i = 0; i < variables; i += 1 + variables / 8)
+      fmi2GetDirectionalDerivative(c, &references[variables - 1 - i], 1, &references[i], 1, values.data(),
+                                   changes.data());
     fmi2GetReal(c, references.data(), variables, changes.data());
     fmi2DoStep(c, time, step, fmi2True);
     fmi2GetReal(c, references.data(), variables, changes.data());
   }
   const fmi2Integer order = 1;
-  for (fmi2ValueReference r : references) fmi2GetRealOutputDerivatives(c, &r, 1, &order, changes.data());
+  for (std::size_t i = 0; i < variables; i += 1 + variables / 8)
+    fmi2GetRealOutputDerivatives(c, &references[i], 1, &order, changes.data());
 }
 
 }  // namespace
@@ -77,9 +79,11 @@ bool takeResource(const unsigned char* bytes, std::size_t size) {
 }
 
 bool takeState(const std::string& scene, const unsigned char* bytes, std::size_t size) {
-  std::ifstream stream(scene, std::ios::binary);
-  const std::string data{std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
-  tiefmu::Resource resource = tiefmu::readResource(data);
+  static const tiefmu::Resource read = [&] {
+    std::ifstream stream(scene, std::ios::binary);
+    return tiefmu::readResource(std::string{std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()});
+  }();
+  tiefmu::Resource resource = read;
   const std::size_t variables = tiefmu::Layout(resource.model).size;
   fmi2Component c = new Instance(logger(), std::move(resource));
   fmi2EnterInitializationMode(c);
