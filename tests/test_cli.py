@@ -170,8 +170,7 @@ def test_steps_and_times_must_be_positive(weld, scene_file, capsys, option, valu
 
 def test_a_run_that_diverges_says_where(free, scene_file, capsys):
     free["integrator"] = {"time_step": 1.0, "safety": 1.0}
-    free["spring"][0]["damping"] = 1e6
-    free["initial"] = [{"nodes": [1], "v": [0, 0, 1e300]}]
+    free["initial"] = [{"nodes": [1], "v": [0, 0, 1e12]}]
     assert main(["run", scene_file(free), "--stop-time", "1e3", "--step", "1"]) == 2
     said = capsys.readouterr()
     assert said.err.startswith("error: weld.toml: stopped at t = ") and said.err.count("\n") == 1
