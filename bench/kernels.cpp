@@ -36,11 +36,11 @@ double now() {
 
 // Best of several runs of `body`, each long enough to be measured, in seconds per call.
 template <class Body>
-double best(Body&& body, double enough = 0.05) {
+double best(Body&& body, double enough = 0.002) {
   body();
   long calls = 1;
   double shortest = 1e30;
-  for (int run = 0; run < 7;) {
+  for (int run = 0; run < 200;) {
     const double start = now();
     for (long k = 0; k < calls; ++k) body();
     const double taken = now() - start;

@@ -66,9 +66,11 @@ Dynamics::Dynamics(const Model& m, const Layout& l, double* d) : model(m), layou
     load_.resize(3 * s);
     moment_.resize(3 * u);
   }
-  if (springs || energy || model.anyFree()) {
+  if (springs || energy || gravity_) {
     nodeLoad_.resize(3 * n);
     nodeMoment_.resize(3 * r);
+  }
+  if (springs || energy || model.anyFree()) {
     step_.resize(3 * n);
     stepSpin_.resize(3 * r);
   }
@@ -136,7 +138,7 @@ void Dynamics::prepareMass() {
   if (!model.finite())
     eachGroup([&](const TieGroup& group, SegmentRange range, TieGeometry, std::size_t g) {
       if (group.coupling == Coupling::meanMotion)
-        updateFrames(group, range, model.nodePosition.data(), frames_.data() + firstFrame_[g]);
+        sound_ &= updateFrames(group, range, model.nodePosition.data(), frames_.data() + firstFrame_[g]);
     });
   updateGeometry();
   if (inertia_) updateInertia();
@@ -151,21 +153,22 @@ void Dynamics::updateGeometry() {
   if (!model.finite()) return;
   eachGroup([&](const TieGroup& group, SegmentRange range, TieGeometry, std::size_t g) {
     if (group.coupling != Coupling::meanMotion) return;
-    if (has(Field::position)) updateFrames(group, range, field(Field::position), frames_.data() + firstFrame_[g]);
+    if (has(Field::position)) sound_ &= updateFrames(group, range, field(Field::position), frames_.data() + firstFrame_[g]);
     if (has(Field::segmentRotation))
       rotateOffsets(group, range, field(Field::segmentRotation) + 4 * firstFrame_[g], model.slaveOffset.data(),
                     field(Field::offset));
   });
 }
 
-std::string Dynamics::collapsed() const {
+std::string Dynamics::collapsed() {
+  if (sound_) return {};
   std::size_t k = 0;
   const double* rotation = has(Field::segmentRotation) ? data + layout[Field::segmentRotation].offset : nullptr;
   for (const TieGroup& group : model.groups) {
     if (group.coupling != Coupling::meanMotion) continue;
     for (int e = 0; e < group.segments(); ++e, ++k) {
       const double* m = frames_[k].inverse;
-      double sum = m[0] + m[1] + m[2] + m[3] + m[4] + m[5];
+      double sum = m[0] + m[1] + m[2] + m[4] + m[5] + m[8];
       if (rotation) sum += rotation[4 * k] + rotation[4 * k + 1] + rotation[4 * k + 2] + rotation[4 * k + 3];
       if (std::isfinite(sum)) continue;
       std::string ids;
@@ -174,6 +177,7 @@ std::string Dynamics::collapsed() const {
       return ids;
     }
   }
+  sound_ = true;
   return {};
 }
 
@@ -237,8 +241,12 @@ void Dynamics::gatherLoads() {
   const double *force = field(Field::slaveForce), *moment = field(Field::slaveMoment);
   slaveLoad_ = force;
   slaveMoment_ = moment;
+  loadOnNodes_ = field(Field::nodeForce);
+  momentOnNodes_ = field(Field::nodeMoment);
   strain_ = dissipation_ = turnRate_ = 0;
   if (!nodeLoad_.empty()) {
+    loadOnNodes_ = nodeLoad_.data();
+    momentOnNodes_ = nodeMoment_.data();
     std::fill(nodeLoad_.begin(), nodeLoad_.end(), 0.0);
     std::fill(nodeMoment_.begin(), nodeMoment_.end(), 0.0);
     const Vec3& g = model.settings.gravity;
@@ -320,10 +328,9 @@ void Dynamics::evaluate() {
   double *a = field(Field::acceleration), *z = field(Field::angularAcceleration);
   if (!inertia_) {
     const double *mass = field(Field::addedMass), *inertia = field(Field::addedInertia);
-    for (int i = first; i < last; ++i)
-      at(a, i) = (at(nodeLoad_.data(), i) + at(f, i)) / (model.nodeMass[i] + mass[i]);
-    for (int i = first; i < turning; ++i)
-      at(z, i) = (at(nodeMoment_.data(), i) + at(t, i)) / (model.nodeInertia[i] + inertia[i]);
+    accelerate(last - first, loadOnNodes_ + 3 * first, f + 3 * first, &model.nodeMass[first], mass + first, a + 3 * first);
+    accelerate(turning - first, momentOnNodes_ + 3 * first, t + 3 * first, &model.nodeInertia[first], inertia + first,
+               z + 3 * first);
     return;
   }
   if (!inertia_->constant()) updateInertia();
@@ -339,8 +346,8 @@ void Dynamics::evaluate() {
     inertialLoads();
     distributeLoads(as_.data(), zs_.data(), right_.data(), rightMoment_.data());
   }
-  for (int i = 3 * first; i < 3 * last; ++i) right_[i] += nodeLoad_[i];
-  for (int i = 3 * first; i < 3 * turning; ++i) rightMoment_[i] += nodeMoment_[i];
+  for (int i = 3 * first; i < 3 * last; ++i) right_[i] += loadOnNodes_[i];
+  for (int i = 3 * first; i < 3 * turning; ++i) rightMoment_[i] += momentOnNodes_[i];
   inertia_->solve(right_.data() + 3 * first, rightMoment_.data() + 3 * first, a + 3 * first, z + 3 * first);
 }
 
@@ -388,8 +395,9 @@ void Dynamics::inputsAt(double tau) {
 void Dynamics::kick(double h) {
   const double *a = field(Field::acceleration), *z = field(Field::angularAcceleration);
   double *v = field(Field::velocity), *w = field(Field::spin);
-  for (int i = 3 * model.freeBegin(); i < 3 * model.freeEnd(); ++i) v[i] += h * a[i];
-  for (int i = 3 * model.freeBegin(); i < 3 * model.rotating(); ++i) w[i] += h * z[i];
+  const int first = 3 * model.freeBegin();
+  addScaled(3 * model.free(), h, a + first, v + first);
+  addScaled(3 * model.rotating() - first, h, z + first, w + first);
 }
 
 void Dynamics::drift(double h, double ahead) {
@@ -420,7 +428,7 @@ void Dynamics::drift(double h, double ahead) {
     if (group.coupling != Coupling::meanMotion) return;
     double* q = turns ? field(Field::segmentRotation) + 4 * firstFrame_[g] : nullptr;
     if (model.finite()) {
-      moveSegments(group, range, h, field(Field::position), v, frames_.data() + firstFrame_[g], q);
+      sound_ &= moveSegments(group, range, h, field(Field::position), v, frames_.data() + firstFrame_[g], q);
       if (turns) rotateOffsets(group, range, q, model.slaveOffset.data(), field(Field::offset));
     } else if (turns) {
       for (int e = 0; e < group.segments(); ++e) {
@@ -430,13 +438,13 @@ void Dynamics::drift(double h, double ahead) {
       }
     }
   });
-  for (std::size_t k = 0; k < layout[Field::angle].count; ++k) field(Field::angle)[k] += h * w[k];
+  addScaled(layout[Field::angle].count, h, w, field(Field::angle));
   if (!has(Field::position)) return;
   double* x = field(Field::position);
   if (drivenMove_) {
-    for (int k = 0; k < 3 * model.nodes(); ++k) x[k] += h * v[k];
+    addScaled(3 * model.nodes(), h, v, x);
   } else {  // driven positions that are inputs stay as they were set
-    for (int k = 3 * model.freeBegin(); k < 3 * model.freeEnd(); ++k) x[k] += h * v[k];
+    addScaled(3 * model.free(), h, v + 3 * model.freeBegin(), x + 3 * model.freeBegin());
     updateGeometry();
   }
 }

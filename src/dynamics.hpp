@@ -31,7 +31,7 @@ class Dynamics {
   void updateGeometry();
   // Node ids of a meanMotion segment whose nodes have come to lie on a line, so that its motion is not defined: "1, 2, 3".
   // Empty: none.
-  std::string collapsed() const;
+  std::string collapsed();
 
   // Loads at the present geometry with `lagged` velocities in the dampers: T^T f_s into the reactions, then the free
   // nodes' accelerations, with `predicted` velocities in the bias.
@@ -114,7 +114,10 @@ class Dynamics {
   std::vector<double> displacement_;              // small geometry: x - X
   const double* slaveLoad_ = nullptr;
   const double* slaveMoment_ = nullptr;
+  const double* loadOnNodes_ = nullptr;           // `nodeLoad_`, or the inputs where nothing adds to them
+  const double* momentOnNodes_ = nullptr;
   double strain_ = 0, dissipation_ = 0, turnRate_ = 0;
+  bool sound_ = true;                             // no kernel has met a collapsed segment since the last look
   bool gravity_ = false, offsetsTurn_ = false, bias_ = false, knownAccelerations_ = false, drivenMove_ = true;
   std::unique_ptr<ConsistentInertia> inertia_;
   std::shared_ptr<Change> change_;  // scratch of `directional`, made at its first call

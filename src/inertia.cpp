@@ -293,9 +293,8 @@ void ConsistentInertia::addSegments(const TieGroup& group, const std::vector<int
         second += slaveMass[s] * (d.squaredNorm() * Mat3::Identity() - d * d.transpose()) +
                   slaveInertia[s] * Mat3::Identity();
       }
-      const double* m = frame[e].inverse;
-      Mat3 inverse, spin[4];
-      inverse << m[0], m[1], m[2], m[1], m[3], m[4], m[2], m[4], m[5];
+      const Eigen::Map<const Mat3> inverse(frame[e].inverse);
+      Mat3 spin[4];
       for (int i = 0; i < n; ++i) spin[i] = inverse * skew(at(frame[e].arm, i));
       const Mat3 lever = skew(moment) / n;
       for (int i = 0; i < n; ++i)

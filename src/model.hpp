@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "scene.hpp"
+#include "tie_view.hpp"
 
 namespace tiefmu {
 
@@ -17,13 +18,6 @@ namespace tiefmu {
 enum NodeGroup : int {
   rotatingDrivenMaster, rotatingDrivenPoint, rotatingFixedMaster, rotatingFixedPoint, rotatingFreeMaster,
   rotatingFreePoint, freeMaster, freePoint, fixedMaster, fixedPoint, drivenMaster, drivenPoint, nodeGroups
-};
-
-// How a slave follows its segment (THEORY 2).
-enum class Coupling : std::uint8_t {
-  rotation,     // default formulation, every master of the segment turns: v_s = v_P + w_P x d
-  meanMotion,   // optimized formulation: v_s = v_C + w x d
-  translation,  // default formulation, masters without rotation: v_s = v_P
 };
 
 // Slaves of one coupling on segments of one shape, contiguous in every slave array and grouped by segment.

@@ -150,6 +150,7 @@ struct Simulation::Impl {
     for (Field f : {Field::velocity, Field::spin}) {
       const double* v = field(f);
       const int last = f == Field::velocity ? model->freeEnd() : model->rotating();
+      if (within(3 * (last - model->freeBegin()), v + 3 * model->freeBegin(), runaway)) continue;
       for (int i = model->freeBegin(); i < last; ++i)
         for (int k = 0; k < 3; ++k) {
           if (std::abs(v[3 * i + k]) < runaway) continue;  // false for NaN
@@ -166,6 +167,7 @@ struct Simulation::Impl {
   // Of all nodes after h more at the present velocities (0: as they stand).
   void checkPlaces(double h) {
     const double *x = field(Field::position), *v = field(Field::velocity);
+    if (h == 0 && within(layout[Field::position].count, x, farAway)) return;
     for (std::size_t k = 0; k < layout[Field::position].count; ++k) {
       if (std::abs(x[k] + h * v[k]) < farAway) continue;  // false for NaN
       char text[120];

@@ -11,24 +11,6 @@
 
 namespace tiefmu {
 
-// What a meanMotion segment needs of its present shape: arms r_i = x_i - C (m), centre C (m), Ibar^-1 (1/m2, xx xy xz
-// yy yz zz).
-struct SegmentFrame {
-  double arm[12];
-  double centre[3];
-  double inverse[6];
-};
-
-// Present geometry, as the kernels read it.
-struct TieGeometry {
-  const double* offset;         // 3 per slave: d
-  const SegmentFrame* frame;    // of the group's first segment; meanMotion only
-};
-
-struct SegmentRange {
-  int first, last;
-};
-
 // u_s = T u. `u`, `turn`: 3 per node / rotating node (velocity and spin, or acceleration, or displacement and small
 // rotation); writes `us` (3 per slave) and `turns` (3 per turning slave). [seed (4), (5)]
 void follow(const TieGroup& group, SegmentRange range, TieGeometry geometry, const double* u, const double* turn,
@@ -46,8 +28,8 @@ void addBias(const TieGroup& group, SegmentRange range, TieGeometry geometry, co
 // x_s: 3 per slave, from node positions and offsets (m).
 void place(const TieGroup& group, SegmentRange range, TieGeometry geometry, const double* position, double* xs);
 
-// Arms, centres and Ibar^-1 of meanMotion segments at these node positions.
-void updateFrames(const TieGroup& group, SegmentRange range, const double* position, SegmentFrame* frame);
+// Arms, centres and Ibar^-1 of meanMotion segments at these node positions. False: one has collapsed to a line or a point.
+bool updateFrames(const TieGroup& group, SegmentRange range, const double* position, SegmentFrame* frame);
 
 // Offsets of a rotation group turned by exp(h w_P), their length held at 1/sqrt(inverseLength2) to rounding.
 // `inverseLength2`: 1/d0^2 per slave, 0 for d0 = 0.
@@ -57,8 +39,8 @@ void turnOffsets(const TieGroup& group, SegmentRange range, double h, const doub
 // meanMotion segments over a step in which their nodes move from `position` by h `velocity`: the frames at its end, and
 // (unless null) the rotation, a unit quaternion (w, x, y, z) per segment. The rotation is the Cayley map of h w / 2, w
 // at mid step: of all second-order choices the one that turns with a segment that rotates rigidly exactly, since its
-// nodes then move by 2 tan(angle / 2) n x r_mid.
-void moveSegments(const TieGroup& group, SegmentRange range, double h, const double* position, const double* velocity,
+// nodes then move by 2 tan(angle / 2) n x r_mid. False as above.
+bool moveSegments(const TieGroup& group, SegmentRange range, double h, const double* position, const double* velocity,
                   SegmentFrame* frame, double* rotation);
 
 // d = R d0 for the slaves of meanMotion segments.
@@ -68,6 +50,15 @@ void rotateOffsets(const TieGroup& group, SegmentRange range, const double* rota
 // Angular velocity of each meanMotion segment: w = Ibar^-1 sum r x v. `spin`: 3 per segment.
 void meanSpin(const TieGroup& group, SegmentRange range, const SegmentFrame* frame, const double* velocity,
               double* spin);
+
+// Loops over nodes that every step makes.
+// value += h rate
+void addScaled(std::size_t count, double h, const double* rate, double* value);
+// (load + reaction) / (mass + added): 3 per node over 1 per node.
+void accelerate(std::size_t nodes, const double* load, const double* reaction, const double* mass, const double* added,
+                double* acceleration);
+// Is every |value| below the limit? NaN is not.
+bool within(std::size_t count, const double* value, double limit);
 
 // Changes with the nodes' positions, which only meanMotion couplings feel (dx: 3 per node, m). Each adds to its result.
 //   followChange: (dT) u    distributeChange: (dT)^T (F, M)    biasChange: db

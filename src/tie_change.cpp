@@ -23,8 +23,7 @@ struct Changing {
       arm[i] = at(frame.arm, i);
       dArm[i] = at(dx, node[i]) - centre;
     }
-    const double* m = frame.inverse;
-    inverse << m[0], m[1], m[2], m[1], m[3], m[4], m[2], m[4], m[5];
+    inverse = Eigen::Map<const Mat3>(frame.inverse);
   }
 
   // (sum 2 (p.q) 1 - q p^T - p q^T) y: change of Ibar for arms p that change by q, times y.

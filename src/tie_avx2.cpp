@@ -1,0 +1,2 @@
+#define TIEFMU_KERNELS avx2Kernels
+#include "tie_kernels.ipp"

@@ -1,0 +1,2 @@
+#define TIEFMU_KERNELS baselineKernels
+#include "tie_kernels.ipp"

@@ -1,0 +1,480 @@
+// The kernels of tie.hpp, compiled in each build under its own flags. Nothing here may use a function that another build
+// shares, or the linker could keep the one that this machine cannot run.
+#include <cmath>
+#include <cstddef>
+#include <type_traits>
+
+#include "pack.hpp"
+#include "tie_kernels.hpp"
+
+namespace tiefmu {
+namespace {
+
+template <int N>
+struct Corners {
+  const int* node;
+  TIEFMU_INLINE void gather(const double* field, Pack* to) const {
+    for (int i = 0; i < N; ++i) to[i] = load(field + 3 * static_cast<std::ptrdiff_t>(node[i]));
+  }
+  TIEFMU_INLINE void add(const Pack* from, double* field) const {
+    for (int i = 0; i < N; ++i) {
+      double* p = field + 3 * static_cast<std::ptrdiff_t>(node[i]);
+      store(p, loadStored(p) + from[i]);
+    }
+  }
+};
+
+template <int N>
+TIEFMU_INLINE Pack weighted(const double* phi, const Pack* u) {
+  Pack sum = phi[0] * u[0];
+  for (int i = 1; i < N; ++i) sum += phi[i] * u[i];
+  return sum;
+}
+
+template <int N>
+TIEFMU_INLINE Pack mean(const Pack* u) {
+  Pack sum = u[0];
+  for (int i = 1; i < N; ++i) sum += u[i];
+  return (1.0 / N) * sum;
+}
+
+template <int N>
+TIEFMU_INLINE void arms(const SegmentFrame& frame, Pack* r) {
+  for (int i = 0; i < N; ++i) r[i] = load(frame.arm + 3 * i);
+}
+
+// w = Ibar^-1 sum r x v
+template <int N>
+TIEFMU_INLINE Pack rigidSpin(const Pack* r, const Columns& inverse, const Pack* v) {
+  Pack sum = crossZxy(r[0], v[0]);
+  for (int i = 1; i < N; ++i) sum += crossZxy(r[i], v[i]);
+  return inverse * yzx(sum);
+}
+
+// Four segments side by side: each is a long chain of dependent operations.
+struct Four {
+  Lanes xx, xy, xz, yy, yz, zz;  // symmetric matrices
+  TIEFMU_INLINE Lanes3 operator*(const Lanes3& a) const {
+    return {xx * a.x + xy * a.y + xz * a.z, xy * a.x + yy * a.y + yz * a.z, xz * a.x + yz * a.y + zz * a.z};
+  }
+};
+
+// Arms from the centre of the nodes, and Ibar^-1.
+template <int N>
+TIEFMU_INLINE Four frameOf(Lanes3* x, Lanes3& centre) {
+  centre = x[0];
+  for (int i = 1; i < N; ++i) centre = centre + x[i];
+  centre = (1.0 / N) * centre;
+  Lanes xx = {}, xy = {}, xz = {}, yy = {}, yz = {}, zz = {};
+  for (int i = 0; i < N; ++i) {
+    x[i] = x[i] - centre;
+    xx += x[i].x * x[i].x;
+    xy += x[i].x * x[i].y;
+    xz += x[i].x * x[i].z;
+    yy += x[i].y * x[i].y;
+    yz += x[i].y * x[i].z;
+    zz += x[i].z * x[i].z;
+  }
+  const Lanes a = yy + zz, b = -xy, c = -xz, d = xx + zz, e = -yz, f = xx + yy;
+  const Lanes A = d * f - e * e, B = c * e - b * f, C = b * e - c * d;
+  const Lanes s = 1.0 / (a * A + b * B + c * C);
+  return {s * A, s * B, s * C, s * (a * f - c * c), s * (b * c - a * e), s * (a * d - b * b)};
+}
+
+template <int N>
+TIEFMU_INLINE void storeFrames(const Lanes3* arm, const Lanes3& centre, const Four& inverse, SegmentFrame* frame,
+                               int count) {
+  constexpr std::ptrdiff_t stride = sizeof(SegmentFrame) / sizeof(double);
+  static_assert(offsetof(SegmentFrame, centre) == 12 * sizeof(double) && stride == 24);
+  double* to = frame->arm;
+  const Lanes3 last = N == 4 ? arm[3] : Lanes3{};
+  storeFour(to, stride, count, arm[0].x, arm[0].y, arm[0].z, arm[1].x);
+  storeFour(to + 4, stride, count, arm[1].y, arm[1].z, arm[2].x, arm[2].y);
+  storeFour(to + 8, stride, count, arm[2].z, last.x, last.y, last.z);
+  storeFour(to + 12, stride, count, centre.x, centre.y, centre.z, inverse.xx);
+  storeFour(to + 16, stride, count, inverse.xy, inverse.xz, inverse.xy, inverse.yy);
+  storeFour(to + 20, stride, count, inverse.yz, inverse.xz, inverse.yz, inverse.zz);
+}
+
+// Of sums of x - x, which is 0 only where x is finite.
+TIEFMU_INLINE bool sound(const Lanes& sum) { return sum[0] + sum[1] + sum[2] + sum[3] == 0; }
+
+// Calls body(first segment, how many of the four count, gather); past the end the last segment stands in.
+template <int N, class Body>
+TIEFMU_INLINE void eachFourSegments(const TieView& tie, Body body) {
+  for (int e = tie.range.first; e < tie.range.last; e += 4) {
+    const int last = tie.range.last - 1, count = last - e < 3 ? last - e + 1 : 4;
+    const int* node[4];
+    for (int k = 0; k < 4; ++k) node[k] = tie.node + N * static_cast<std::ptrdiff_t>(e + k < last ? e + k : last);
+    const auto gather = [&](const double* field, Lanes3* to) TIEFMU_INLINED {
+      const auto at = [&](int k, int i) TIEFMU_INLINED { return field + 3 * static_cast<std::ptrdiff_t>(node[k][i]); };
+      for (int i = 0; i < N; ++i) to[i] = loadFour(at(0, i), at(1, i), at(2, i), at(3, i));
+    };
+    if (count == 4) body(e, 4, gather);
+    else body(e, count, gather);
+  }
+}
+
+// Calls body(segment, corners, first slave, last slave); slaves as indices of the slave arrays.
+template <int N, class Body>
+TIEFMU_INLINE void eachSegment(const TieView& tie, Body body) {
+  for (int e = tie.range.first; e < tie.range.last; ++e)
+    body(e, Corners<N>{tie.node + N * static_cast<std::ptrdiff_t>(e)}, tie.firstSlave + tie.begin[e],
+         tie.firstSlave + tie.begin[e + 1]);
+}
+
+// Phi, to be indexed by N times a slave's place in the slave arrays.
+template <int N>
+TIEFMU_INLINE const double* weights(const TieView& tie) {
+  return tie.weight - N * tie.firstSlave;
+}
+
+// Calls body(number of corners as a type).
+template <class Body>
+TIEFMU_INLINE void byCorners(const TieView& tie, Body body) {
+  if (tie.corners == 4) body(std::integral_constant<int, 4>{});
+  else body(std::integral_constant<int, 3>{});
+}
+
+template <int N>
+TIEFMU_INLINE void followTranslation(const TieView& tie, const double* u, double* us) {
+  const double* weight = weights<N>(tie);
+  eachSegment<N>(tie, [&](int, Corners<N> corners, std::ptrdiff_t s, std::ptrdiff_t last) TIEFMU_INLINED {
+    Pack ui[N];
+    corners.gather(u, ui);
+    for (; s < last; ++s) store(us + 3 * s, weighted<N>(weight + N * s, ui));
+  });
+}
+
+template <int N>
+TIEFMU_INLINE void followRotation(const TieView& tie, const double* offset, const double* u, const double* turn,
+                                  double* us, double* turns) {
+  const double* weight = weights<N>(tie);
+  eachSegment<N>(tie, [&](int, Corners<N> corners, std::ptrdiff_t s, std::ptrdiff_t last) TIEFMU_INLINED {
+    Pack ui[N], wi[N];
+    corners.gather(u, ui);
+    corners.gather(turn, wi);
+    for (; s < last; ++s) {
+      const Pack w = weighted<N>(weight + N * s, wi);
+      store(us + 3 * s, weighted<N>(weight + N * s, ui) + cross(w, load(offset + 3 * s)));
+      store(turns + 3 * s, w);
+    }
+  });
+}
+
+template <int N>
+TIEFMU_INLINE void followMeanMotion(const TieView& tie, TieGeometry geometry, const double* u, double* us,
+                                    double* turns) {
+  eachSegment<N>(tie, [&](int e, Corners<N> corners, std::ptrdiff_t s, std::ptrdiff_t last) TIEFMU_INLINED {
+    Pack ui[N], r[N];
+    corners.gather(u, ui);
+    arms<N>(geometry.frame[e], r);
+    const Pack w = rigidSpin<N>(r, loadColumns(geometry.frame[e].inverse), ui), centre = mean<N>(ui);
+    for (; s < last; ++s) {
+      store(us + 3 * s, centre + cross(w, load(geometry.offset + 3 * s)));
+      store(turns + 3 * s, w);
+    }
+  });
+}
+
+void follow(const TieView& tie, TieGeometry geometry, const double* u, const double* turn, double* us, double* turns) {
+  byCorners(tie, [&](auto n) TIEFMU_INLINED {
+    constexpr int N = decltype(n)::value;
+    if (tie.coupling == Coupling::translation) followTranslation<N>(tie, u, us);
+    else if (tie.coupling == Coupling::rotation) followRotation<N>(tie, geometry.offset, u, turn, us, turns);
+    else followMeanMotion<N>(tie, geometry, u, us, turns);
+  });
+}
+
+template <int N>
+TIEFMU_INLINE void distributeTranslation(const TieView& tie, const double* force, double* f) {
+  const double* weight = weights<N>(tie);
+  eachSegment<N>(tie, [&](int, Corners<N> corners, std::ptrdiff_t s, std::ptrdiff_t last) TIEFMU_INLINED {
+    Pack fi[N] = {};
+    for (; s < last; ++s) {
+      const Pack F = load(force + 3 * s);
+      for (int i = 0; i < N; ++i) fi[i] += weight[N * s + i] * F;
+    }
+    corners.add(fi, f);
+  });
+}
+
+template <int N>
+TIEFMU_INLINE void distributeRotation(const TieView& tie, const double* offset, const double* force,
+                                      const double* moment, double* f, double* t) {
+  const double* weight = weights<N>(tie);
+  eachSegment<N>(tie, [&](int, Corners<N> corners, std::ptrdiff_t s, std::ptrdiff_t last) TIEFMU_INLINED {
+    Pack fi[N] = {}, ti[N] = {};
+    for (; s < last; ++s) {
+      const Pack F = load(force + 3 * s);
+      const Pack M = load(moment + 3 * s) + cross(load(offset + 3 * s), F);
+      for (int i = 0; i < N; ++i) {
+        fi[i] += weight[N * s + i] * F;
+        ti[i] += weight[N * s + i] * M;
+      }
+    }
+    corners.add(fi, f);
+    corners.add(ti, t);
+  });
+}
+
+template <int N>
+TIEFMU_INLINE void distributeMeanMotion(const TieView& tie, TieGeometry geometry, const double* force,
+                                        const double* moment, double* f) {
+  eachSegment<N>(tie, [&](int e, Corners<N> corners, std::ptrdiff_t s, std::ptrdiff_t last) TIEFMU_INLINED {
+    Pack F = {}, M = {}, lever = {};
+    for (; s < last; ++s) {
+      const Pack one = load(force + 3 * s);
+      F += one;
+      M += load(moment + 3 * s);
+      lever += crossZxy(load(geometry.offset + 3 * s), one);
+    }
+    M += yzx(lever);
+    Pack r[N], fi[N];
+    arms<N>(geometry.frame[e], r);
+    const Pack A = loadColumns(geometry.frame[e].inverse) * M, share = (1.0 / N) * F;
+    for (int i = 0; i < N; ++i) fi[i] = share + cross(A, r[i]);
+    corners.add(fi, f);
+  });
+}
+
+void distribute(const TieView& tie, TieGeometry geometry, const double* force, const double* moment, double* f,
+                double* t) {
+  byCorners(tie, [&](auto n) TIEFMU_INLINED {
+    constexpr int N = decltype(n)::value;
+    if (tie.coupling == Coupling::translation) distributeTranslation<N>(tie, force, f);
+    else if (tie.coupling == Coupling::rotation) distributeRotation<N>(tie, geometry.offset, force, moment, f, t);
+    else distributeMeanMotion<N>(tie, geometry, force, moment, f);
+  });
+}
+
+template <int N>
+TIEFMU_INLINE void biasRotation(const TieView& tie, const double* offset, const double* spin, double* as) {
+  const double* weight = weights<N>(tie);
+  eachSegment<N>(tie, [&](int, Corners<N> corners, std::ptrdiff_t s, std::ptrdiff_t last) TIEFMU_INLINED {
+    Pack wi[N];
+    corners.gather(spin, wi);
+    for (; s < last; ++s) {
+      const Pack w = weighted<N>(weight + N * s, wi);
+      store(as + 3 * s, load(as + 3 * s) + cross(w, cross(w, load(offset + 3 * s))));
+    }
+  });
+}
+
+// z_b = -Ibar^-1 (dIbar/dt) w, dIbar/dt = sum 2 (r.r') 1 - r' r^T - r r'^T.
+template <int N>
+TIEFMU_INLINE void biasMeanMotion(const TieView& tie, TieGeometry geometry, const double* v, double* as, double* zs) {
+  eachSegment<N>(tie, [&](int e, Corners<N> corners, std::ptrdiff_t s, std::ptrdiff_t last) TIEFMU_INLINED {
+    Pack vi[N], r[N];
+    corners.gather(v, vi);
+    const SegmentFrame& frame = geometry.frame[e];
+    arms<N>(frame, r);
+    const Columns inverse = loadColumns(frame.inverse);
+    const Pack w = rigidSpin<N>(r, inverse, vi), centre = mean<N>(vi);
+    Pack rate = {};
+    for (int i = 0; i < N; ++i) {
+      const Pack rDot = vi[i] - centre;
+      rate += (2 * dot(r[i], rDot)) * w - dot(r[i], w) * rDot - dot(rDot, w) * r[i];
+    }
+    const Pack z = -(inverse * rate);
+    for (; s < last; ++s) {
+      const Pack d = load(geometry.offset + 3 * s);
+      store(as + 3 * s, load(as + 3 * s) + cross(z, d) + cross(w, cross(w, d)));
+      store(zs + 3 * s, load(zs + 3 * s) + z);
+    }
+  });
+}
+
+void addBias(const TieView& tie, TieGeometry geometry, const double* velocity, const double* spin, double* as,
+             double* zs) {
+  byCorners(tie, [&](auto n) TIEFMU_INLINED {
+    constexpr int N = decltype(n)::value;
+    if (tie.coupling == Coupling::rotation) biasRotation<N>(tie, geometry.offset, spin, as);
+    if (tie.coupling == Coupling::meanMotion) biasMeanMotion<N>(tie, geometry, velocity, as, zs);
+  });
+}
+
+void place(const TieView& tie, TieGeometry geometry, const double* position, double* xs) {
+  byCorners(tie, [&](auto n) TIEFMU_INLINED {
+    constexpr int N = decltype(n)::value;
+    const double* weight = weights<N>(tie);
+    const bool centred = tie.coupling == Coupling::meanMotion;
+    eachSegment<N>(tie, [&](int, Corners<N> corners, std::ptrdiff_t s, std::ptrdiff_t last) TIEFMU_INLINED {
+      Pack xi[N];
+      corners.gather(position, xi);
+      const Pack centre = mean<N>(xi);
+      for (; s < last; ++s)
+        store(xs + 3 * s, (centred ? centre : weighted<N>(weight + N * s, xi)) + load(geometry.offset + 3 * s));
+    });
+  });
+}
+
+bool updateFrames(const TieView& tie, const double* position, SegmentFrame* frame) {
+  Lanes unsound = {};
+  byCorners(tie, [&](auto n) TIEFMU_INLINED {
+    constexpr int N = decltype(n)::value;
+    eachFourSegments<N>(tie, [&](int e, int count, auto gather) TIEFMU_INLINED {
+      Lanes3 x[N], centre;
+      gather(position, x);
+      const Four inverse = frameOf<N>(x, centre);
+      storeFrames<N>(x, centre, inverse, frame + e, count);
+      unsound += inverse.xx - inverse.xx;
+    });
+  });
+  return sound(unsound);
+}
+
+// Four offsets by d + sin(a)/a (angle x d) + (1 - cos a)/a^2 angle x (angle x d), a = |angle| [Rodrigues].
+TIEFMU_INLINE void turnFour(const double* angle, const double* inverseLength2, double* offset) {
+  const Lanes3 u = loadFour(angle, angle + 3, angle + 6, angle + 9);
+  const Lanes3 d = loadFour(offset, offset + 3, offset + 6, offset + 9);
+  const Lanes a2 = dot(u, u);
+  // A step of 2 degrees at most: the terms left out are below 1e-17.
+  Lanes s = 1 + a2 * (-1.0 / 6 + a2 * (1.0 / 120 - a2 * (1.0 / 5040)));
+  Lanes c = 0.5 + a2 * (-1.0 / 24 + a2 * (1.0 / 720 - a2 * (1.0 / 40320)));
+  if ((a2[0] >= 1e-3) | (a2[1] >= 1e-3) | (a2[2] >= 1e-3) | (a2[3] >= 1e-3))
+    for (int k = 0; k < 4; ++k) {
+      if (!(a2[k] >= 1e-3)) continue;
+      const double a = std::sqrt(a2[k]), half = std::sin(0.5 * a);
+      s[k] = std::sin(a) / a;
+      c[k] = 2 * half * half / a2[k];
+    }
+  const Lanes3 once = cross(u, d), turned = d + s * once + c * cross(u, once);
+  // One Newton step of 1/sqrt: exact, as the length is off by rounding only.
+  const Lanes inverse = {inverseLength2[0], inverseLength2[1], inverseLength2[2], inverseLength2[3]};
+  const Lanes3 result = (1.5 - 0.5 * dot(turned, turned) * inverse) * turned;
+  for (int k = 0; k < 4; ++k) {
+    offset[3 * k] = result.x[k];
+    offset[3 * k + 1] = result.y[k];
+    offset[3 * k + 2] = result.z[k];
+  }
+}
+
+void turnOffsets(const TieView& tie, double h, const double* spin, const double* inverseLength2, double* offset) {
+  constexpr int most = 128;
+  double angle[3 * most];  // of the slaves [first, first + count)
+  std::ptrdiff_t first = tie.firstSlave + tie.begin[tie.range.first];
+  int count = 0;
+  const auto turn = [&](int fours) TIEFMU_INLINED {
+    for (int k = 0; k < fours; k += 4) turnFour(angle + 3 * k, inverseLength2 + first + k, offset + 3 * (first + k));
+    first += fours;
+  };
+  byCorners(tie, [&](auto n) TIEFMU_INLINED {
+    constexpr int N = decltype(n)::value;
+    const double* weight = weights<N>(tie);
+    eachSegment<N>(tie, [&](int, Corners<N> corners, std::ptrdiff_t s, std::ptrdiff_t last) TIEFMU_INLINED {
+      Pack wi[N];
+      corners.gather(spin, wi);
+      for (int i = 0; i < N; ++i) wi[i] = h * wi[i];
+      while (s < last) {
+        const std::ptrdiff_t end = last - s < most - count ? last : s + (most - count);
+        for (; s < end; ++s, ++count) store(angle + 3 * count, weighted<N>(weight + N * s, wi));
+        if (count == most) {
+          turn(most);
+          count = 0;
+        }
+      }
+    });
+  });
+  const int left = count % 4, begin = count - left;
+  turn(begin);
+  if (left == 0) return;
+  double d[12] = {}, w[12] = {}, inverse[4] = {};
+  for (int i = 0; i < 3 * left; ++i) {
+    d[i] = offset[3 * first + i];
+    w[i] = angle[3 * begin + i];
+    inverse[i / 3] = inverseLength2[first + i / 3];
+  }
+  turnFour(w, inverse, d);
+  for (int i = 0; i < 3 * left; ++i) offset[3 * first + i] = d[i];
+}
+
+bool moveSegments(const TieView& tie, double h, const double* position, const double* velocity, SegmentFrame* frame,
+                  double* rotation) {
+  Lanes unsound = {};
+  byCorners(tie, [&](auto n) TIEFMU_INLINED {
+    constexpr int N = decltype(n)::value;
+    eachFourSegments<N>(tie, [&](int e, int count, auto gather) TIEFMU_INLINED {
+      Lanes3 x[N], v[N], r[N], centre;
+      gather(position, x);
+      gather(velocity, v);
+      if (rotation) {
+        for (int i = 0; i < N; ++i) r[i] = x[i] + (0.5 * h) * v[i];
+        const Four inverse = frameOf<N>(r, centre);
+        Lanes3 sum = cross(r[0], v[0]);
+        for (int i = 1; i < N; ++i) sum = sum + cross(r[i], v[i]);
+        const Lanes3 u = (0.5 * h) * (inverse * sum);
+        unsound += u.x - u.x;
+        // q <- (1, u) q, scaled to unit length
+        double* q = rotation + 4 * static_cast<std::ptrdiff_t>(e);
+        const auto old = [&](int m) TIEFMU_INLINED {
+          const auto of = [&](int k) TIEFMU_INLINED { return q[4 * (k < count ? k : count - 1) + m]; };
+          return Lanes{of(0), of(1), of(2), of(3)};
+        };
+        const Lanes a = old(0), b = old(1), c = old(2), d = old(3);
+        const Lanes w = a - u.x * b - u.y * c - u.z * d, i = b + u.x * a + u.y * d - u.z * c,
+                    j = c + u.y * a + u.z * b - u.x * d, l = d + u.z * a + u.x * c - u.y * b;
+        const Lanes scale = 1.0 / root(w * w + i * i + j * j + l * l);
+        storeFour(q, 4, count, scale * w, scale * i, scale * j, scale * l);
+      }
+      // The end as the positions are advanced, so that a restored state finds the same bits.
+      for (int i = 0; i < N; ++i) x[i] = x[i] + h * v[i];
+      const Four inverse = frameOf<N>(x, centre);
+      storeFrames<N>(x, centre, inverse, frame + e, count);
+      unsound += inverse.xx - inverse.xx;
+    });
+  });
+  return sound(unsound);
+}
+
+void rotateOffsets(const TieView& tie, const double* rotation, const double* initialOffset, double* offset) {
+  for (int e = tie.range.first; e < tie.range.last; ++e) {
+    const double* q = rotation + 4 * static_cast<std::ptrdiff_t>(e);
+    const double w = q[0], x = q[1], y = q[2], z = q[3];
+    const Pack c0 = pack(1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y));
+    const Pack c1 = pack(2 * (x * y - w * z), 1 - 2 * (x * x + z * z), 2 * (y * z + w * x));
+    const Pack c2 = pack(2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y));
+    for (std::ptrdiff_t s = tie.firstSlave + tie.begin[e]; s < tie.firstSlave + tie.begin[e + 1]; ++s) {
+      const double* d0 = initialOffset + 3 * s;
+      store(offset + 3 * s, d0[0] * c0 + d0[1] * c1 + d0[2] * c2);
+    }
+  }
+}
+
+void meanSpin(const TieView& tie, const SegmentFrame* frame, const double* velocity, double* spin) {
+  byCorners(tie, [&](auto n) TIEFMU_INLINED {
+    constexpr int N = decltype(n)::value;
+    eachSegment<N>(tie, [&](int e, Corners<N> corners, std::ptrdiff_t, std::ptrdiff_t) TIEFMU_INLINED {
+      Pack v[N], r[N];
+      corners.gather(velocity, v);
+      arms<N>(frame[e], r);
+      store(spin + 3 * static_cast<std::ptrdiff_t>(e), rigidSpin<N>(r, loadColumns(frame[e].inverse), v));
+    });
+  });
+}
+
+// What every step does to nodes.
+
+void addScaled(std::size_t count, double h, const double* rate, double* value) {
+  for (std::size_t k = 0; k < count; ++k) value[k] += h * rate[k];
+}
+
+void accelerate(std::size_t nodes, const double* load, const double* reaction, const double* mass, const double* added,
+                double* acceleration) {
+  for (std::size_t i = 0; i < nodes; ++i)
+    store(acceleration + 3 * i, (tiefmu::load(load + 3 * i) + tiefmu::load(reaction + 3 * i)) / (mass[i] + added[i]));
+}
+
+bool within(std::size_t count, const double* value, double limit) {
+  std::size_t outside = 0;
+  for (std::size_t k = 0; k < count; ++k) outside += !(std::fabs(value[k]) < limit);  // counts NaN
+  return outside == 0;
+}
+
+}  // namespace
+
+const TieKernels TIEFMU_KERNELS = {follow,      distribute,   addBias,       place,   updateFrames,
+                                   turnOffsets, moveSegments, rotateOffsets, meanSpin, addScaled,
+                                   accelerate,  within};
+
+}  // namespace tiefmu
