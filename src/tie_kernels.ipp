@@ -43,12 +43,12 @@ TIEFMU_INLINE void arms(const SegmentFrame& frame, Pack* r) {
   for (int i = 0; i < N; ++i) r[i] = load(frame.arm + 3 * i);
 }
 
-// w = Ibar^-1 sum r x v
+// sum r x v, of unit masses at the corners: Ibar w
 template <int N>
-TIEFMU_INLINE Pack rigidSpin(const Pack* r, const Columns& inverse, const Pack* v) {
+TIEFMU_INLINE Pack angularMomentum(const Pack* r, const Pack* v) {
   Pack sum = crossZxy(r[0], v[0]);
   for (int i = 1; i < N; ++i) sum += crossZxy(r[i], v[i]);
-  return inverse * yzx(sum);
+  return yzx(sum);
 }
 
 // Four segments side by side: each is a long chain of dependent operations.
@@ -99,11 +99,21 @@ TIEFMU_INLINE void storeFrames(const Lanes3* arm, const Lanes3& centre, const Fo
 // Of sums of x - x, which is 0 only where x is finite.
 TIEFMU_INLINE bool sound(const Lanes& sum) { return sum[0] + sum[1] + sum[2] + sum[3] == 0; }
 
+// Segments that a loop takes at a time, where several short loops hide the latency that one long one shows.
+constexpr int together = 32;
+
+// Calls body(first, last) over the range.
+template <class Body>
+TIEFMU_INLINE void eachRun(const TieView& tie, Body body) {
+  for (int first = tie.range.first; first < tie.range.last; first += together)
+    body(first, tie.range.last - first < together ? tie.range.last : first + together);
+}
+
 // Calls body(first segment, how many of the four count, gather); past the end the last segment stands in.
 template <int N, class Body>
-TIEFMU_INLINE void eachFourSegments(const TieView& tie, Body body) {
-  for (int e = tie.range.first; e < tie.range.last; e += 4) {
-    const int last = tie.range.last - 1, count = last - e < 3 ? last - e + 1 : 4;
+TIEFMU_INLINE void eachFourSegments(const TieView& tie, int first, int end, Body body) {
+  for (int e = first; e < end; e += 4) {
+    const int last = end - 1, count = last - e < 3 ? last - e + 1 : 4;
     const int* node[4];
     for (int k = 0; k < 4; ++k) node[k] = tie.node + N * static_cast<std::ptrdiff_t>(e + k < last ? e + k : last);
     const auto gather = [&](const double* field, Lanes3* to) TIEFMU_INLINED {
@@ -115,11 +125,16 @@ TIEFMU_INLINE void eachFourSegments(const TieView& tie, Body body) {
   }
 }
 
+template <int N>
+TIEFMU_INLINE Corners<N> corners(const TieView& tie, int e) {
+  return {tie.node + N * static_cast<std::ptrdiff_t>(e)};
+}
+
 // Calls body(segment, corners, first slave, last slave); slaves as indices of the slave arrays.
 template <int N, class Body>
 TIEFMU_INLINE void eachSegment(const TieView& tie, Body body) {
   for (int e = tie.range.first; e < tie.range.last; ++e)
-    body(e, Corners<N>{tie.node + N * static_cast<std::ptrdiff_t>(e)}, tie.firstSlave + tie.begin[e],
+    body(e, corners<N>(tie, e), tie.firstSlave + tie.begin[e],
          tie.firstSlave + tie.begin[e + 1]);
 }
 
@@ -139,9 +154,9 @@ TIEFMU_INLINE void byCorners(const TieView& tie, Body body) {
 template <int N>
 TIEFMU_INLINE void followTranslation(const TieView& tie, const double* u, double* us) {
   const double* weight = weights<N>(tie);
-  eachSegment<N>(tie, [&](int, Corners<N> corners, std::ptrdiff_t s, std::ptrdiff_t last) TIEFMU_INLINED {
+  eachSegment<N>(tie, [&](int, Corners<N> nodes, std::ptrdiff_t s, std::ptrdiff_t last) TIEFMU_INLINED {
     Pack ui[N];
-    corners.gather(u, ui);
+    nodes.gather(u, ui);
     for (; s < last; ++s) store(us + 3 * s, weighted<N>(weight + N * s, ui));
   });
 }
@@ -150,10 +165,10 @@ template <int N>
 TIEFMU_INLINE void followRotation(const TieView& tie, const double* offset, const double* u, const double* turn,
                                   double* us, double* turns) {
   const double* weight = weights<N>(tie);
-  eachSegment<N>(tie, [&](int, Corners<N> corners, std::ptrdiff_t s, std::ptrdiff_t last) TIEFMU_INLINED {
+  eachSegment<N>(tie, [&](int, Corners<N> nodes, std::ptrdiff_t s, std::ptrdiff_t last) TIEFMU_INLINED {
     Pack ui[N], wi[N];
-    corners.gather(u, ui);
-    corners.gather(turn, wi);
+    nodes.gather(u, ui);
+    nodes.gather(turn, wi);
     for (; s < last; ++s) {
       const Pack w = weighted<N>(weight + N * s, wi);
       store(us + 3 * s, weighted<N>(weight + N * s, ui) + cross(w, load(offset + 3 * s)));
@@ -165,14 +180,22 @@ TIEFMU_INLINE void followRotation(const TieView& tie, const double* offset, cons
 template <int N>
 TIEFMU_INLINE void followMeanMotion(const TieView& tie, TieGeometry geometry, const double* u, double* us,
                                     double* turns) {
-  eachSegment<N>(tie, [&](int e, Corners<N> corners, std::ptrdiff_t s, std::ptrdiff_t last) TIEFMU_INLINED {
-    Pack ui[N], r[N];
-    corners.gather(u, ui);
-    arms<N>(geometry.frame[e], r);
-    const Pack w = rigidSpin<N>(r, loadColumns(geometry.frame[e].inverse), ui), centre = mean<N>(ui);
-    for (; s < last; ++s) {
-      store(us + 3 * s, centre + cross(w, load(geometry.offset + 3 * s)));
-      store(turns + 3 * s, w);
+  eachRun(tie, [&](int first, int last) TIEFMU_INLINED {
+    Pack centre[together], w[together];
+    for (int e = first; e < last; ++e) {
+      Pack ui[N], r[N];
+      corners<N>(tie, e).gather(u, ui);
+      arms<N>(geometry.frame[e], r);
+      centre[e - first] = mean<N>(ui);
+      w[e - first] = angularMomentum<N>(r, ui);
+    }
+    for (int e = first; e < last; ++e) w[e - first] = loadColumns(geometry.frame[e].inverse) * w[e - first];
+    for (int e = first; e < last; ++e) {
+      const Pack c = centre[e - first], spin = w[e - first];
+      for (std::ptrdiff_t s = tie.firstSlave + tie.begin[e]; s < tie.firstSlave + tie.begin[e + 1]; ++s) {
+        store(us + 3 * s, c + cross(spin, load(geometry.offset + 3 * s)));
+        store(turns + 3 * s, spin);
+      }
     }
   });
 }
@@ -189,13 +212,13 @@ void follow(const TieView& tie, TieGeometry geometry, const double* u, const dou
 template <int N>
 TIEFMU_INLINE void distributeTranslation(const TieView& tie, const double* force, double* f) {
   const double* weight = weights<N>(tie);
-  eachSegment<N>(tie, [&](int, Corners<N> corners, std::ptrdiff_t s, std::ptrdiff_t last) TIEFMU_INLINED {
+  eachSegment<N>(tie, [&](int, Corners<N> nodes, std::ptrdiff_t s, std::ptrdiff_t last) TIEFMU_INLINED {
     Pack fi[N] = {};
     for (; s < last; ++s) {
       const Pack F = load(force + 3 * s);
       for (int i = 0; i < N; ++i) fi[i] += weight[N * s + i] * F;
     }
-    corners.add(fi, f);
+    nodes.add(fi, f);
   });
 }
 
@@ -203,38 +226,52 @@ template <int N>
 TIEFMU_INLINE void distributeRotation(const TieView& tie, const double* offset, const double* force,
                                       const double* moment, double* f, double* t) {
   const double* weight = weights<N>(tie);
-  eachSegment<N>(tie, [&](int, Corners<N> corners, std::ptrdiff_t s, std::ptrdiff_t last) TIEFMU_INLINED {
+  const std::ptrdiff_t end = tie.firstSlave + tie.begin[tie.range.last];
+  Pack F = {}, M = {};
+  const auto next = [&](std::ptrdiff_t s) TIEFMU_INLINED {
+    F = load(force + 3 * s);
+    M = load(moment + 3 * s) + cross(load(offset + 3 * s), F);
+  };
+  if (tie.range.first < tie.range.last) next(tie.firstSlave + tie.begin[tie.range.first]);
+  eachSegment<N>(tie, [&](int, Corners<N> nodes, std::ptrdiff_t s, std::ptrdiff_t last) TIEFMU_INLINED {
     Pack fi[N] = {}, ti[N] = {};
     for (; s < last; ++s) {
-      const Pack F = load(force + 3 * s);
-      const Pack M = load(moment + 3 * s) + cross(load(offset + 3 * s), F);
+      const Pack F0 = F, M0 = M;
+      if (s + 1 < end) next(s + 1);  // ahead of its use, as its latency is longer than this loop's work
       for (int i = 0; i < N; ++i) {
-        fi[i] += weight[N * s + i] * F;
-        ti[i] += weight[N * s + i] * M;
+        fi[i] += weight[N * s + i] * F0;
+        ti[i] += weight[N * s + i] * M0;
       }
     }
-    corners.add(fi, f);
-    corners.add(ti, t);
+    nodes.add(fi, f);
+    nodes.add(ti, t);
   });
 }
 
 template <int N>
 TIEFMU_INLINE void distributeMeanMotion(const TieView& tie, TieGeometry geometry, const double* force,
                                         const double* moment, double* f) {
-  eachSegment<N>(tie, [&](int e, Corners<N> corners, std::ptrdiff_t s, std::ptrdiff_t last) TIEFMU_INLINED {
-    Pack F = {}, M = {}, lever = {};
-    for (; s < last; ++s) {
-      const Pack one = load(force + 3 * s);
-      F += one;
-      M += load(moment + 3 * s);
-      lever += crossZxy(load(geometry.offset + 3 * s), one);
+  eachRun(tie, [&](int first, int last) TIEFMU_INLINED {
+    Pack F[together], A[together];
+    for (int e = first; e < last; ++e) {
+      Pack sum = {}, moments = {}, levers = {};
+      for (std::ptrdiff_t s = tie.firstSlave + tie.begin[e]; s < tie.firstSlave + tie.begin[e + 1]; ++s) {
+        const Pack one = load(force + 3 * s);
+        sum += one;
+        moments += load(moment + 3 * s);
+        levers += crossZxy(load(geometry.offset + 3 * s), one);
+      }
+      F[e - first] = sum;
+      A[e - first] = moments + yzx(levers);
     }
-    M += yzx(lever);
-    Pack r[N], fi[N];
-    arms<N>(geometry.frame[e], r);
-    const Pack A = loadColumns(geometry.frame[e].inverse) * M, share = (1.0 / N) * F;
-    for (int i = 0; i < N; ++i) fi[i] = share + cross(A, r[i]);
-    corners.add(fi, f);
+    for (int e = first; e < last; ++e) A[e - first] = loadColumns(geometry.frame[e].inverse) * A[e - first];
+    for (int e = first; e < last; ++e) {
+      Pack r[N], fi[N];
+      arms<N>(geometry.frame[e], r);
+      const Pack share = (1.0 / N) * F[e - first];
+      for (int i = 0; i < N; ++i) fi[i] = share + cross(A[e - first], r[i]);
+      corners<N>(tie, e).add(fi, f);
+    }
   });
 }
 
@@ -251,9 +288,9 @@ void distribute(const TieView& tie, TieGeometry geometry, const double* force, c
 template <int N>
 TIEFMU_INLINE void biasRotation(const TieView& tie, const double* offset, const double* spin, double* as) {
   const double* weight = weights<N>(tie);
-  eachSegment<N>(tie, [&](int, Corners<N> corners, std::ptrdiff_t s, std::ptrdiff_t last) TIEFMU_INLINED {
+  eachSegment<N>(tie, [&](int, Corners<N> nodes, std::ptrdiff_t s, std::ptrdiff_t last) TIEFMU_INLINED {
     Pack wi[N];
-    corners.gather(spin, wi);
+    nodes.gather(spin, wi);
     for (; s < last; ++s) {
       const Pack w = weighted<N>(weight + N * s, wi);
       store(as + 3 * s, load(as + 3 * s) + cross(w, cross(w, load(offset + 3 * s))));
@@ -264,13 +301,13 @@ TIEFMU_INLINE void biasRotation(const TieView& tie, const double* offset, const 
 // z_b = -Ibar^-1 (dIbar/dt) w, dIbar/dt = sum 2 (r.r') 1 - r' r^T - r r'^T.
 template <int N>
 TIEFMU_INLINE void biasMeanMotion(const TieView& tie, TieGeometry geometry, const double* v, double* as, double* zs) {
-  eachSegment<N>(tie, [&](int e, Corners<N> corners, std::ptrdiff_t s, std::ptrdiff_t last) TIEFMU_INLINED {
+  eachSegment<N>(tie, [&](int e, Corners<N> nodes, std::ptrdiff_t s, std::ptrdiff_t last) TIEFMU_INLINED {
     Pack vi[N], r[N];
-    corners.gather(v, vi);
+    nodes.gather(v, vi);
     const SegmentFrame& frame = geometry.frame[e];
     arms<N>(frame, r);
     const Columns inverse = loadColumns(frame.inverse);
-    const Pack w = rigidSpin<N>(r, inverse, vi), centre = mean<N>(vi);
+    const Pack w = inverse * angularMomentum<N>(r, vi), centre = mean<N>(vi);
     Pack rate = {};
     for (int i = 0; i < N; ++i) {
       const Pack rDot = vi[i] - centre;
@@ -299,9 +336,9 @@ void place(const TieView& tie, TieGeometry geometry, const double* position, dou
     constexpr int N = decltype(n)::value;
     const double* weight = weights<N>(tie);
     const bool centred = tie.coupling == Coupling::meanMotion;
-    eachSegment<N>(tie, [&](int, Corners<N> corners, std::ptrdiff_t s, std::ptrdiff_t last) TIEFMU_INLINED {
+    eachSegment<N>(tie, [&](int, Corners<N> nodes, std::ptrdiff_t s, std::ptrdiff_t last) TIEFMU_INLINED {
       Pack xi[N];
-      corners.gather(position, xi);
+      nodes.gather(position, xi);
       const Pack centre = mean<N>(xi);
       for (; s < last; ++s)
         store(xs + 3 * s, (centred ? centre : weighted<N>(weight + N * s, xi)) + load(geometry.offset + 3 * s));
@@ -313,7 +350,7 @@ bool updateFrames(const TieView& tie, const double* position, SegmentFrame* fram
   Lanes unsound = {};
   byCorners(tie, [&](auto n) TIEFMU_INLINED {
     constexpr int N = decltype(n)::value;
-    eachFourSegments<N>(tie, [&](int e, int count, auto gather) TIEFMU_INLINED {
+    eachFourSegments<N>(tie, tie.range.first, tie.range.last, [&](int e, int count, auto gather) TIEFMU_INLINED {
       Lanes3 x[N], centre;
       gather(position, x);
       const Four inverse = frameOf<N>(x, centre);
@@ -362,9 +399,9 @@ void turnOffsets(const TieView& tie, double h, const double* spin, const double*
   byCorners(tie, [&](auto n) TIEFMU_INLINED {
     constexpr int N = decltype(n)::value;
     const double* weight = weights<N>(tie);
-    eachSegment<N>(tie, [&](int, Corners<N> corners, std::ptrdiff_t s, std::ptrdiff_t last) TIEFMU_INLINED {
+    eachSegment<N>(tie, [&](int, Corners<N> nodes, std::ptrdiff_t s, std::ptrdiff_t last) TIEFMU_INLINED {
       Pack wi[N];
-      corners.gather(spin, wi);
+      nodes.gather(spin, wi);
       for (int i = 0; i < N; ++i) wi[i] = h * wi[i];
       while (s < last) {
         const std::ptrdiff_t end = last - s < most - count ? last : s + (most - count);
@@ -389,40 +426,52 @@ void turnOffsets(const TieView& tie, double h, const double* spin, const double*
   for (int i = 0; i < 3 * left; ++i) offset[3 * first + i] = d[i];
 }
 
+// q <- (1, u) q, scaled to unit length, for the first `count` of four quaternions.
+TIEFMU_INLINE void turnQuaternions(const Lanes3& u, int count, double* q) {
+  const auto old = [&](int m) TIEFMU_INLINED {
+    const auto of = [&](int k) TIEFMU_INLINED { return q[4 * (k < count ? k : count - 1) + m]; };
+    return Lanes{of(0), of(1), of(2), of(3)};
+  };
+  const Lanes a = old(0), b = old(1), c = old(2), d = old(3);
+  const Lanes w = a - u.x * b - u.y * c - u.z * d, i = b + u.x * a + u.y * d - u.z * c,
+              j = c + u.y * a + u.z * b - u.x * d, k = d + u.z * a + u.x * c - u.y * b;
+  const Lanes scale = 1.0 / root(w * w + i * i + j * j + k * k);
+  storeFour(q, 4, count, scale * w, scale * i, scale * j, scale * k);
+}
+
 bool moveSegments(const TieView& tie, double h, const double* position, const double* velocity, SegmentFrame* frame,
                   double* rotation) {
   Lanes unsound = {};
-  byCorners(tie, [&](auto n) TIEFMU_INLINED {
-    constexpr int N = decltype(n)::value;
-    eachFourSegments<N>(tie, [&](int e, int count, auto gather) TIEFMU_INLINED {
-      Lanes3 x[N], v[N], r[N], centre;
-      gather(position, x);
-      gather(velocity, v);
-      if (rotation) {
-        for (int i = 0; i < N; ++i) r[i] = x[i] + (0.5 * h) * v[i];
-        const Four inverse = frameOf<N>(r, centre);
-        Lanes3 sum = cross(r[0], v[0]);
-        for (int i = 1; i < N; ++i) sum = sum + cross(r[i], v[i]);
-        const Lanes3 u = (0.5 * h) * (inverse * sum);
-        unsound += u.x - u.x;
-        // q <- (1, u) q, scaled to unit length
-        double* q = rotation + 4 * static_cast<std::ptrdiff_t>(e);
-        const auto old = [&](int m) TIEFMU_INLINED {
-          const auto of = [&](int k) TIEFMU_INLINED { return q[4 * (k < count ? k : count - 1) + m]; };
-          return Lanes{of(0), of(1), of(2), of(3)};
-        };
-        const Lanes a = old(0), b = old(1), c = old(2), d = old(3);
-        const Lanes w = a - u.x * b - u.y * c - u.z * d, i = b + u.x * a + u.y * d - u.z * c,
-                    j = c + u.y * a + u.z * b - u.x * d, l = d + u.z * a + u.x * c - u.y * b;
-        const Lanes scale = 1.0 / root(w * w + i * i + j * j + l * l);
-        storeFour(q, 4, count, scale * w, scale * i, scale * j, scale * l);
-      }
-      // The end as the positions are advanced, so that a restored state finds the same bits.
-      for (int i = 0; i < N; ++i) x[i] = x[i] + h * v[i];
-      const Four inverse = frameOf<N>(x, centre);
-      storeFrames<N>(x, centre, inverse, frame + e, count);
-      unsound += inverse.xx - inverse.xx;
+  eachRun(tie, [&](int first, int last) TIEFMU_INLINED {
+    Lanes3 turn[together / 4];
+    byCorners(tie, [&](auto n) TIEFMU_INLINED {
+      constexpr int N = decltype(n)::value;
+      eachFourSegments<N>(tie, first, last, [&](int e, int count, auto gather) TIEFMU_INLINED {
+        Lanes3 x[N], v[N], r[N], centre;
+        gather(position, x);
+        gather(velocity, v);
+        if (rotation) {
+          for (int i = 0; i < N; ++i) r[i] = x[i] + (0.5 * h) * v[i];
+          const Four inverse = frameOf<N>(r, centre);
+          Lanes3 sum = cross(r[0], v[0]);
+          for (int i = 1; i < N; ++i) sum = sum + cross(r[i], v[i]);
+          const Lanes3 u = (0.5 * h) * (inverse * sum);
+          unsound += u.x - u.x;
+          turn[(e - first) / 4] = u;
+        }
+        // The end as the positions are advanced, so that a restored state finds the same bits.
+        for (int i = 0; i < N; ++i) x[i] = x[i] + h * v[i];
+        const Four inverse = frameOf<N>(x, centre);
+        storeFrames<N>(x, centre, inverse, frame + e, count);
+        unsound += inverse.xx - inverse.xx;
+      });
     });
+    if (!rotation) return;
+    for (int e = first; e + 4 <= last; e += 4)
+      turnQuaternions(turn[(e - first) / 4], 4, rotation + 4 * static_cast<std::ptrdiff_t>(e));
+    const int left = (last - first) % 4;
+    if (left > 0)
+      turnQuaternions(turn[(last - first) / 4], left, rotation + 4 * static_cast<std::ptrdiff_t>(last - left));
   });
   return sound(unsound);
 }
@@ -444,11 +493,11 @@ void rotateOffsets(const TieView& tie, const double* rotation, const double* ini
 void meanSpin(const TieView& tie, const SegmentFrame* frame, const double* velocity, double* spin) {
   byCorners(tie, [&](auto n) TIEFMU_INLINED {
     constexpr int N = decltype(n)::value;
-    eachSegment<N>(tie, [&](int e, Corners<N> corners, std::ptrdiff_t, std::ptrdiff_t) TIEFMU_INLINED {
+    eachSegment<N>(tie, [&](int e, Corners<N> nodes, std::ptrdiff_t, std::ptrdiff_t) TIEFMU_INLINED {
       Pack v[N], r[N];
-      corners.gather(velocity, v);
+      nodes.gather(velocity, v);
       arms<N>(frame[e], r);
-      store(spin + 3 * static_cast<std::ptrdiff_t>(e), rigidSpin<N>(r, loadColumns(frame[e].inverse), v));
+      store(spin + 3 * static_cast<std::ptrdiff_t>(e), loadColumns(frame[e].inverse) * angularMomentum<N>(r, v));
     });
   });
 }
