@@ -1,6 +1,7 @@
 #include "resource.hpp"
 
 #include <cereal/archives/portable_binary.hpp>
+#include <algorithm>
 #include <sstream>
 #include <type_traits>
 
@@ -10,7 +11,7 @@ namespace tiefmu {
 namespace {
 
 constexpr std::string_view magic = "tiefmu scene\n";
-constexpr std::uint32_t formatVersion = 1;  // raise it whenever `fields` changes
+constexpr std::uint32_t formatVersion = 2;  // raise it whenever `fields` changes
 constexpr std::size_t headerSize = magic.size() + 4 + 8 + 8;
 
 // FNV-1a, 64 bit: against damage in transport, not against intent.
@@ -149,6 +150,7 @@ void field(Archive& a, TieGroup& g) {
   field(a, g.node);
   field(a, g.begin);
   field(a, g.weight);
+  field(a, g.partEnd);
 }
 
 template <class Archive>
@@ -263,6 +265,8 @@ void checkGroups(const Model& m) {
     requireSize(g.node, corners * segments, "corners of segments");
     requireSize(g.weight, corners * slaves, "weights");
     requireFinite(g.weight, "weights that are not finite");
+    require(!g.partEnd.empty() && std::is_sorted(g.partEnd.begin(), g.partEnd.end()) && g.partEnd.front() >= 0 &&
+                g.partEnd.back() <= g.segments(), "parts");
     const int nodes = g.coupling == Coupling::rotation ? m.rotating() : m.nodes();
     for (int node : g.node) require(node >= 0 && node < nodes, "corners of segments");
     next += slaves;

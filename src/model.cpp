@@ -5,6 +5,7 @@
 #include <numeric>
 #include <tuple>
 
+#include "ordering.hpp"
 #include "search.hpp"
 
 namespace tiefmu {
@@ -60,6 +61,7 @@ class Compiler {
   std::vector<std::uint8_t> turns;    // per scene node: rotational freedom that the model keeps
   std::vector<int> nodeIndex, slaveIndex;  // per scene node: index in the model, or -1
   std::vector<int> segmentRotation;   // per slave of the model: index of its meanMotion segment, or -1
+  std::vector<std::vector<int>> partEnds;  // per group
   int meanMotionSegments = 0;
 
   void warn(std::string line) { model.findings.push_back({Finding::warning, std::move(line)}); }
@@ -259,6 +261,11 @@ class Compiler {
       static constexpr int still[] = {drivenMaster, freeMaster, fixedMaster};
       group[node] = (turns[node] ? turning : still)[static_cast<int>(all.motion[node])] + (master[node] ? 0 : 1);
     }
+    std::vector<Vec3> places;
+    for (int node : used) places.push_back(all.position[node]);
+    std::vector<int> near;
+    for (int k : localOrder(places)) near.push_back(used[k]);
+    used = std::move(near);
     std::stable_sort(used.begin(), used.end(), [&](int a, int b) { return group[a] < group[b]; });
     nodeIndex.assign(all.id.size(), -1);
     for (int node : used) {
@@ -278,11 +285,52 @@ class Compiler {
     }
   }
 
-  void placeSlaves() {
-    const auto key = [&](const Bond& b) {
-      return std::tuple(b.coupling, -b.corners, b.segment, scene.nodes.id[b.slave]);
+  // Bonds by coupling, shape and segment: segments as localOrder and then `split` of each group say.
+  void sortBonds() {
+    const auto sort = [&](const std::vector<int>& rank) {
+      const auto key = [&](int k) {
+        const Bond& b = bonds[k];
+        return std::tuple(b.coupling, -b.corners, rank[k], b.segment, scene.nodes.id[b.slave]);
+      };
+      std::vector<int> order(bonds.size());
+      std::iota(order.begin(), order.end(), 0);
+      std::sort(order.begin(), order.end(), [&](int a, int b) { return key(a) < key(b); });
+      std::vector<Bond> sorted;
+      sorted.reserve(bonds.size());
+      for (int k : order) sorted.push_back(bonds[k]);
+      bonds = std::move(sorted);
     };
-    std::sort(bonds.begin(), bonds.end(), [&](const Bond& a, const Bond& b) { return key(a) < key(b); });
+    std::vector<Vec3> centres(scene.segments.id.size(), Vec3(0, 0, 0));
+    for (int e = 0; e < static_cast<int>(centres.size()); ++e) {
+      Vec3 x[4];
+      gather(e, x);
+      for (int i = 0; i < corners(e); ++i) centres[e] += x[i] / corners(e);
+    }
+    std::vector<int> rankOf(centres.size()), rank(bonds.size());
+    const std::vector<int> order = localOrder(centres);
+    for (int k = 0; k < static_cast<int>(order.size()); ++k) rankOf[order[k]] = k;
+    for (std::size_t k = 0; k < bonds.size(); ++k) rank[k] = rankOf[bonds[k].segment];
+    sort(rank);
+    const int count = static_cast<int>(bonds.size());
+    for (int first = 0, last = 0; first < count; first = last) {
+      std::vector<int> node, segmentOf;  // segmentOf: per bond of the group, counted within it
+      for (; last < count && bonds[last].coupling == bonds[first].coupling && bonds[last].corners == bonds[first].corners; ++last) {
+        const Bond& b = bonds[last];
+        if (last == first || b.segment != bonds[last - 1].segment)
+          for (int i = 0; i < b.corners; ++i) node.push_back(nodeIndex[scene.segments.nodes[b.segment][i]]);
+        segmentOf.push_back(static_cast<int>(node.size()) / b.corners - 1);
+      }
+      const Parts parts = split(node, bonds[first].corners);
+      std::vector<int> place(parts.order.size());
+      for (int k = 0; k < static_cast<int>(place.size()); ++k) place[parts.order[k]] = k;
+      for (int k = first; k < last; ++k) rank[k] = place[segmentOf[k - first]];
+      partEnds.push_back(parts.end);
+    }
+    sort(rank);
+  }
+
+  void placeSlaves() {
+    sortBonds();
     std::vector<int> byId(bonds.size()), number(bonds.size());
     std::iota(byId.begin(), byId.end(), 0);
     std::sort(byId.begin(), byId.end(),
@@ -303,7 +351,7 @@ class Compiler {
       const Bond& b = bonds[s];
       if (model.groups.empty() || model.groups.back().coupling != b.coupling ||
           model.groups.back().corners != b.corners) {
-        model.groups.push_back({b.coupling, b.corners, s, {}, {0}, {}});
+        model.groups.push_back({b.coupling, b.corners, s, {}, {0}, {}, partEnds[model.groups.size()]});
         lastSegment = -1;
       }
       TieGroup& group = model.groups.back();
