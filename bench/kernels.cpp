@@ -1,7 +1,7 @@
 // Times one cycle of the solver and the calls of the FMU. Prints CSV rows: case,n,threads,ns,bytes,triad_gb_s
 // (ns per slave and cycle, per call, or per value; bytes per slave that must move, or 0).
 //
-//   tiefmu_bench kernels N         cycles at N slaves: loads to masters, accelerations, velocities, slave motion
+//   tiefmu_bench kernels N [shuffled] [THREADS]   cycles at N slaves: loads to masters, accelerations, velocities, slave motion
 //   tiefmu_bench cycles COUPLING N COUNT   that many cycles and no timing, for instruction counts
 //   tiefmu_bench memory COUPLING N bytes per slave of an FMU's simulation, its model included
 //   tiefmu_bench fmu FOLDER        fmi2DoStep, set and get of an unpacked FMU (FOLDER holds binaries/, resources/)
@@ -66,7 +66,7 @@ double triad() {
 }
 
 // A surface of side x side quads with four slaves each, free masters without springs: every cycle moves everything.
-Scene surface(const std::string& coupling, int slaves, bool shuffled) {
+Scene surface(const std::string& coupling, int slaves, bool shuffled, int threads) {
   Scene scene;
   const int side = std::max(1, static_cast<int>(std::lround(std::sqrt(slaves / 4.0))));
   const auto add = [&](const Vec3& x, Motion motion) {
@@ -108,6 +108,7 @@ Scene surface(const std::string& coupling, int slaves, bool shuffled) {
   for (const Vec3& x : places) tie.slaves.push_back(add(x, Motion::driven));
   scene.ties.push_back(tie);
   scene.settings.timeStep = 1e-6;
+  scene.settings.threads = threads;
   return scene;
 }
 
@@ -132,8 +133,8 @@ double bytesMoved(const std::string& coupling) {
 // One simulation under its own loads, ready to cycle.
 struct Cycle {
   Simulation simulation;
-  Cycle(const std::string& coupling, int slaves, bool shuffled)
-      : simulation(std::make_shared<Model>(compile(surface(coupling, slaves, shuffled)))) {
+  Cycle(const std::string& coupling, int slaves, bool shuffled, int threads)
+      : simulation(std::make_shared<Model>(compile(surface(coupling, slaves, shuffled, threads)))) {
     const std::size_t forces = simulation.layout()[Field::slaveForce].count;
     for (std::size_t k = 0; k < forces; ++k) simulation.field(Field::slaveForce)[k] = 1e-3 * static_cast<double>(k % 7);
     simulation.initialise(0);
@@ -144,13 +145,13 @@ struct Cycle {
   }
 };
 
-void kernels(int slaves, bool shuffled) {
+void kernels(int slaves, bool shuffled, int threads) {
   const double gbs = triad();
   for (const std::string coupling : {"default", "default-rotations", "optimized"}) {
-    Cycle cycle(coupling, slaves, shuffled);
+    Cycle cycle(coupling, slaves, shuffled, threads);
     const double seconds = best(cycle);
     const int n = cycle.simulation.model().slaves();
-    std::printf("%s%s,%d,1,%.2f,%.0f,%.2f\n", coupling.c_str(), shuffled ? "-shuffled" : "", n, 1e9 * seconds / n,
+    std::printf("%s%s,%d,%d,%.2f,%.0f,%.2f\n", coupling.c_str(), shuffled ? "-shuffled" : "", n, threads, 1e9 * seconds / n,
                 bytesMoved(coupling), gbs);
     std::fflush(stdout);
   }
@@ -162,7 +163,7 @@ void memory(const std::string& coupling, int slaves) {
     return static_cast<double>(info.uordblks + info.hblkhd);
   };
   const double before = used();
-  auto model = std::make_shared<Model>(compile(surface(coupling, slaves, false)));
+  auto model = std::make_shared<Model>(compile(surface(coupling, slaves, false, 1)));
   model->slaveReport = std::vector<SlaveReport>();  // an FMU's resource leaves it out
   const double compiled = used();
   Simulation simulation(model);
@@ -249,14 +250,22 @@ void fmu(const std::string& folder) {
 
 int main(int argc, char** argv) {
   const std::string what = argc > 1 ? argv[1] : "";
-  if (what == "kernels" && argc > 2) kernels(std::atoi(argv[2]), argc > 3 && !std::strcmp(argv[3], "shuffled"));
+  if (what == "kernels" && argc > 2) {
+    bool shuffled = false;
+    int threads = 1;
+    for (int k = 3; k < argc; ++k) {
+      if (!std::strcmp(argv[k], "shuffled")) shuffled = true;
+      else threads = std::atoi(argv[k]);
+    }
+    kernels(std::atoi(argv[2]), shuffled, threads);
+  }
   else if (what == "cycles" && argc > 4) {
-    Cycle cycle(argv[2], std::atoi(argv[3]), false);
+    Cycle cycle(argv[2], std::atoi(argv[3]), false, 1);
     for (int k = std::atoi(argv[4]); k > 0; --k) cycle();
   } else if (what == "memory" && argc > 3) memory(argv[2], std::atoi(argv[3]));
   else if (what == "fmu" && argc > 2) fmu(argv[2]);
   else {
-    std::fprintf(stderr, "usage: tiefmu_bench kernels N [shuffled] | cycles COUPLING N COUNT | memory COUPLING N | fmu FOLDER\n");
+    std::fprintf(stderr, "usage: tiefmu_bench kernels N [shuffled] [THREADS] | cycles COUPLING N COUNT | memory COUPLING N | fmu FOLDER\n");
     return 2;
   }
 }

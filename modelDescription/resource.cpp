@@ -163,6 +163,7 @@ void field(Archive& a, Settings& s) {
   field(a, s.method);
   field(a, s.timeStep);
   field(a, s.safety);
+  field(a, s.threads);
   field(a, s.expose);
   field(a, s.hide);
 }
@@ -214,6 +215,7 @@ void checkSettings(const Settings& s) {
   requireEnum(s.geometry, Geometry::small, "geometry");
   requireEnum(s.position, Position::input, "position");
   requireEnum(s.method, Method::rk4, "method");
+  require(s.threads >= 1 && s.threads <= mostThreads, "threads");
   require(s.gravity.allFinite() && std::isfinite(s.timeStep) && std::isfinite(s.safety), "settings");
 }
 

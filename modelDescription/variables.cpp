@@ -18,6 +18,7 @@ struct Row {
 constexpr Row rows[] = {
     {"", "integrator.time_step", "integrator.time_step", false, 1, "s", "time step; 0: safety times the limit"},
     {"", "integrator.safety", "integrator.safety", false, 1, "1", "part of the limit that a time step may take"},
+    {"", "integrator.threads", "integrator.threads", false, 1, "1", "threads that share a step; results do not depend on it"},
     {"", "stable_time_step", "stable_time_step", false, 1, "s", "limit 2/omega_max of the assembled system"},
     {"", "nodal_time_step", "nodal_time_step", false, 1, "s", "smallest sqrt(2 m/K) of all master nodes"},
     {"", "energy.kinetic", "energy", true, 1, "J", "kinetic energy"},
@@ -204,6 +205,9 @@ void addScalars(Table& table, const Model& model) {
   if (model.anyFree()) {
     table.scalar("integrator.time_step", Field::timeStep, Causality::parameter);
     table.scalar("integrator.safety", Field::safety, Causality::parameter);
+  }
+  table.scalar("integrator.threads", Field::threads, Causality::parameter);
+  if (model.anyFree()) {
     table.scalar("stable_time_step", Field::stableTimeStep, Causality::output);
     table.scalar("nodal_time_step", Field::nodalTimeStep, Causality::output);
   }

@@ -2,12 +2,20 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
+#include <system_error>
 
 namespace tiefmu {
 namespace {
 
 void fill(double* to, std::size_t count, const std::vector<double>& from) {
   std::copy_n(from.begin(), count, to);
+}
+
+std::string number(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.6g", value);
+  return text;
 }
 
 void turnQuaternion(double* q, const Vec3& angle) {
@@ -105,6 +113,8 @@ void Dynamics::setStart() {
   std::fill(data, data + layout.size, 0.0);
   *field(Field::timeStep) = model.settings.timeStep;
   *field(Field::safety) = model.settings.safety;
+  *field(Field::threads) = model.settings.threads;
+  workers_.reset();
   fill(field(Field::slaveMass), layout[Field::slaveMass].count, model.slaveMass);
   fill(field(Field::slaveInertia), layout[Field::slaveInertia].count, model.slaveInertia);
   fill(field(Field::velocity), layout[Field::velocity].count, model.nodeVelocity);
@@ -116,7 +126,26 @@ void Dynamics::setStart() {
   *field(Field::stableTimeStep) = *field(Field::nodalTimeStep) = 1e30;
 }
 
+void Dynamics::startThreads() {
+  const double threads = *field(Field::threads);
+  if (!(threads >= 1 && threads <= mostThreads && threads == std::floor(threads)))
+    throw SceneError("integrator.threads is " + number(threads) + "; it must be a whole number from 1 to " +
+                     std::to_string(mostThreads));
+  const bool parts = std::any_of(model.groups.begin(), model.groups.end(),
+                                 [](const TieGroup& group) { return group.partEnd.size() > 1; });
+  const int wanted = parts ? static_cast<int>(threads) : 1;
+  if (wanted == (workers_ ? workers_->threads() : 1)) return;
+  workers_.reset();
+  if (wanted == 1) return;
+  try {
+    workers_ = std::make_unique<Workers>(wanted);
+  } catch (const std::system_error& e) {
+    throw SceneError("integrator.threads is " + number(threads) + ", more than the system gives: " + e.what());
+  }
+}
+
 void Dynamics::prepare() {
+  startThreads();
   lumpedAdditions(model, field(Field::slaveMass), field(Field::slaveInertia), field(Field::addedMass),
                   field(Field::addedInertia));
   nodalStiffness(model, field(Field::stiffness), field(Field::rotationalStiffness));
@@ -138,7 +167,7 @@ void Dynamics::prepareMass() {
   if (!model.finite())
     eachGroup([&](const TieGroup& group, SegmentRange range, TieGeometry, std::size_t g) {
       if (group.coupling == Coupling::meanMotion)
-        sound_ &= updateFrames(group, range, model.nodePosition.data(), frames_.data() + firstFrame_[g]);
+        if (!updateFrames(group, range, model.nodePosition.data(), frames_.data() + firstFrame_[g])) sound_ = false;
     });
   updateGeometry();
   if (inertia_) updateInertia();
@@ -151,9 +180,10 @@ void Dynamics::updateInertia() {
 
 void Dynamics::updateGeometry() {
   if (!model.finite()) return;
-  eachGroup([&](const TieGroup& group, SegmentRange range, TieGeometry, std::size_t g) {
+  eachPart([&](const TieGroup& group, SegmentRange range, TieGeometry, std::size_t g) {
     if (group.coupling != Coupling::meanMotion) return;
-    if (has(Field::position)) sound_ &= updateFrames(group, range, field(Field::position), frames_.data() + firstFrame_[g]);
+    if (has(Field::position) && !updateFrames(group, range, field(Field::position), frames_.data() + firstFrame_[g]))
+      sound_ = false;
     if (has(Field::segmentRotation))
       rotateOffsets(group, range, field(Field::segmentRotation) + 4 * firstFrame_[g], model.slaveOffset.data(),
                     field(Field::offset));
@@ -195,7 +225,7 @@ void Dynamics::placeSlaves(double* xs, bool sprungOnly) {
       xs[k] += vs_[k];
   };
   if (sprungOnly) eachSprung(body);
-  else eachGroup(body);
+  else eachPart(body);
 }
 
 const double* Dynamics::quaternion(int index) const {
@@ -299,22 +329,33 @@ void Dynamics::findTurnRate(const double* v, const double* w) {
 }
 
 void Dynamics::distributeLoads(const double* force, const double* moment, double* f, double* t) {
-  eachGroup([&](const TieGroup& group, SegmentRange range, TieGeometry shape, std::size_t) {
-    distribute(group, range, shape, force, moment, f, t);
-  });
+  for (std::size_t g = 0; g < model.groups.size(); ++g) {
+    const TieGroup& group = model.groups[g];
+    const auto part = [&](int first, int last) { distribute(group, {first, last}, geometry(g), force, moment, f, t); };
+    if (!workers_) {
+      part(0, group.segments());
+      continue;
+    }
+    // Parts touch no common node, so that the sums do not depend on who is first; the border comes after all of them.
+    const std::vector<int>& end = group.partEnd;
+    workers_->each(static_cast<int>(end.size()), [&](int k) { part(k == 0 ? 0 : end[k - 1], end[k]); });
+    part(end.back(), group.segments());
+  }
 }
 
 void Dynamics::evaluateReactions() {
   gatherLoads();
   if (hasBias()) findTurnRate(velocityFor(Field::predicted), spinFor(Field::predicted));
-  std::fill_n(field(Field::reactionForce), layout[Field::reactionForce].count, 0.0);
-  std::fill_n(field(Field::reactionMoment), layout[Field::reactionMoment].count, 0.0);
+  const Slice reactions = layout[Field::reactionForce];  // moments follow
+  eachBlock(reactions.count + layout[Field::reactionMoment].count, [&](std::size_t first, std::size_t last) {
+    std::fill(data + reactions.offset + first, data + reactions.offset + last, 0.0);
+  });
   distributeLoads(slaveLoad_, slaveMoment_, field(Field::reactionForce), field(Field::reactionMoment));
 }
 
 // a_s = T q'' + b into as_, zs_.
 void Dynamics::slaveAccelerations(const double* a, const double* z, const double* v, const double* w) {
-  eachGroup([&](const TieGroup& group, SegmentRange range, TieGeometry shape, std::size_t) {
+  eachPart([&](const TieGroup& group, SegmentRange range, TieGeometry shape, std::size_t) {
     follow(group, range, shape, a, z, as_.data(), zs_.data());
     if (bias_) addBias(group, range, shape, v, w, as_.data(), zs_.data());
   });
@@ -328,9 +369,16 @@ void Dynamics::evaluate() {
   double *a = field(Field::acceleration), *z = field(Field::angularAcceleration);
   if (!inertia_) {
     const double *mass = field(Field::addedMass), *inertia = field(Field::addedInertia);
-    accelerate(last - first, loadOnNodes_ + 3 * first, f + 3 * first, &model.nodeMass[first], mass + first, a + 3 * first);
-    accelerate(turning - first, momentOnNodes_ + 3 * first, t + 3 * first, &model.nodeInertia[first], inertia + first,
-               z + 3 * first);
+    eachBlock(last - first, [&](std::size_t i, std::size_t end) {
+      i += first;
+      end += first;
+      accelerate(end - i, loadOnNodes_ + 3 * i, f + 3 * i, &model.nodeMass[i], mass + i, a + 3 * i);
+    });
+    eachBlock(turning - first, [&](std::size_t i, std::size_t end) {
+      i += first;
+      end += first;
+      accelerate(end - i, momentOnNodes_ + 3 * i, t + 3 * i, &model.nodeInertia[i], inertia + i, z + 3 * i);
+    });
     return;
   }
   if (!inertia_->constant()) updateInertia();
@@ -392,12 +440,19 @@ void Dynamics::inputsAt(double tau) {
   if (!drivenMove_) updateGeometry();
 }
 
+// value += h rate
+void Dynamics::advance(std::size_t count, double h, const double* rate, double* value) {
+  eachBlock(count, [&](std::size_t first, std::size_t last) {
+    addScaled(last - first, h, rate + first, value + first);
+  });
+}
+
 void Dynamics::kick(double h) {
   const double *a = field(Field::acceleration), *z = field(Field::angularAcceleration);
   double *v = field(Field::velocity), *w = field(Field::spin);
   const int first = 3 * model.freeBegin();
-  addScaled(3 * model.free(), h, a + first, v + first);
-  addScaled(3 * model.rotating() - first, h, z + first, w + first);
+  advance(3 * model.free(), h, a + first, v + first);
+  advance(3 * model.rotating() - first, h, z + first, w + first);
 }
 
 void Dynamics::drift(double h, double ahead) {
@@ -422,29 +477,29 @@ void Dynamics::drift(double h, double ahead) {
     }
   }
   const bool turns = has(Field::segmentRotation);
-  eachGroup([&](const TieGroup& group, SegmentRange range, TieGeometry shape, std::size_t g) {
+  eachPart([&](const TieGroup& group, SegmentRange range, TieGeometry shape, std::size_t g) {
     if (group.coupling == Coupling::rotation && offsetsTurn_)
       turnOffsets(group, range, h, w, inverseLength2_.data(), field(Field::offset));
     if (group.coupling != Coupling::meanMotion) return;
     double* q = turns ? field(Field::segmentRotation) + 4 * firstFrame_[g] : nullptr;
     if (model.finite()) {
-      sound_ &= moveSegments(group, range, h, field(Field::position), v, frames_.data() + firstFrame_[g], q);
+      if (!moveSegments(group, range, h, field(Field::position), v, frames_.data() + firstFrame_[g], q)) sound_ = false;
       if (turns) rotateOffsets(group, range, q, model.slaveOffset.data(), field(Field::offset));
     } else if (turns) {
-      for (int e = 0; e < group.segments(); ++e) {
+      for (int e = range.first; e < range.last; ++e) {
         Vec3 spin;
         meanSpin(group, {e, e + 1}, shape.frame, v, spin.data() - 3 * static_cast<std::ptrdiff_t>(e));
         turnQuaternion(q + 4 * static_cast<std::ptrdiff_t>(e), h * spin);
       }
     }
   });
-  addScaled(layout[Field::angle].count, h, w, field(Field::angle));
+  advance(layout[Field::angle].count, h, w, field(Field::angle));
   if (!has(Field::position)) return;
   double* x = field(Field::position);
   if (drivenMove_) {
-    addScaled(3 * model.nodes(), h, v, x);
+    advance(3 * model.nodes(), h, v, x);
   } else {  // driven positions that are inputs stay as they were set
-    addScaled(3 * model.free(), h, v + 3 * model.freeBegin(), x + 3 * model.freeBegin());
+    advance(3 * model.free(), h, v + 3 * model.freeBegin(), x + 3 * model.freeBegin());
     updateGeometry();
   }
 }
@@ -509,7 +564,7 @@ void Dynamics::updateOutputs() {
   const double *v = field(Field::velocity), *w = field(Field::spin);
   const double *a = field(Field::acceleration), *z = field(Field::angularAcceleration);
   double *f = field(Field::reactionForce), *t = field(Field::reactionMoment);
-  eachGroup([&](const TieGroup& group, SegmentRange range, TieGeometry shape, std::size_t) {
+  eachPart([&](const TieGroup& group, SegmentRange range, TieGeometry shape, std::size_t) {
     follow(group, range, shape, v, w, field(Field::slaveVelocity), field(Field::slaveSpin));
   });
   const bool consistent = model.settings.inertia == Inertia::consistent;

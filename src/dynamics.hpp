@@ -1,6 +1,8 @@
 // The equations of motion of one simulation: geometry, forces, accelerations, and what moves them on.
 #pragma once
 
+#include <algorithm>
+#include <atomic>
 #include <memory>
 #include <string>
 #include <vector>
@@ -10,6 +12,7 @@
 #include "layout.hpp"
 #include "spring.hpp"
 #include "tie.hpp"
+#include "workers.hpp"
 
 namespace tiefmu {
 
@@ -76,6 +79,9 @@ class Dynamics {
   // date. Allocates at the first call.
   void directional(double* dot);
 
+  // body(first, last) over blocks of [0, count), shared among threads.
+  template <class Body> void eachBlock(std::size_t count, Body body) const;
+
   std::int64_t evaluations = 0;
 
  private:
@@ -85,6 +91,8 @@ class Dynamics {
   struct Sprung { int group; SegmentRange range; };
   TieGeometry geometry(std::size_t g) const;
   template <class Body> void eachGroup(Body body) const;   // body(group, all its segments, geometry, index)
+  // The same, shared among threads: ranges that cover each group once. `body` may write what belongs to its segments.
+  template <class Body> void eachPart(Body body) const;
   template <class Body> void eachSprung(Body body) const;  // the same for runs of segments whose slaves hold springs
   void placeSlaves(double* xs, bool sprungOnly);
   EndMotion motion(const SpringEnd& end, const Spring& spring, const double* v, const double* w) const;
@@ -97,6 +105,8 @@ class Dynamics {
   void inertialLoads();
   void findTurnRate(const double* v, const double* w);
   void updateInertia();
+  void startThreads();
+  void advance(std::size_t count, double h, const double* rate, double* value);
   const double* velocityFor(Field f) { return has(f) ? field(f) : field(Field::velocity); }
   const double* spinFor(Field f) { return has(f) ? field(f) + 3 * model.nodes() : field(Field::spin); }
 
@@ -117,9 +127,10 @@ class Dynamics {
   const double* loadOnNodes_ = nullptr;           // `nodeLoad_`, or the inputs where nothing adds to them
   const double* momentOnNodes_ = nullptr;
   double strain_ = 0, dissipation_ = 0, turnRate_ = 0;
-  bool sound_ = true;                             // no kernel has met a collapsed segment since the last look
+  std::atomic<bool> sound_{true};                      // no kernel has met a collapsed segment since the last look
   bool gravity_ = false, offsetsTurn_ = false, bias_ = false, knownAccelerations_ = false, drivenMove_ = true;
   std::unique_ptr<ConsistentInertia> inertia_;
+  std::unique_ptr<Workers> workers_;  // none where one thread does it all
   std::shared_ptr<Change> change_;  // scratch of `directional`, made at its first call
 };
 
@@ -127,6 +138,29 @@ template <class Body>
 void Dynamics::eachGroup(Body body) const {
   for (std::size_t g = 0; g < model.groups.size(); ++g)
     body(model.groups[g], SegmentRange{0, model.groups[g].segments()}, geometry(g), g);
+}
+
+template <class Body>
+void Dynamics::eachPart(Body body) const {
+  if (!workers_) return eachGroup(body);
+  for (std::size_t g = 0; g < model.groups.size(); ++g) {
+    const TieGroup& group = model.groups[g];
+    const std::vector<int>& end = group.partEnd;
+    workers_->each(static_cast<int>(end.size()) + 1, [&](int k) {
+      const int first = k == 0 ? 0 : end[k - 1], last = k < static_cast<int>(end.size()) ? end[k] : group.segments();
+      if (first < last) body(group, SegmentRange{first, last}, geometry(g), g);
+    });
+  }
+}
+
+template <class Body>
+void Dynamics::eachBlock(std::size_t count, Body body) const {
+  constexpr std::size_t smallest = 4096, most = 64;
+  const std::size_t blocks = workers_ ? std::clamp<std::size_t>(count / smallest, 1, most) : 1;
+  if (blocks == 1) return body(std::size_t{0}, count);
+  workers_->each(static_cast<int>(blocks), [&](int k) {
+    body(count * k / blocks, count * (k + 1) / blocks);
+  });
 }
 
 template <class Body>

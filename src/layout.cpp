@@ -31,6 +31,7 @@ Layout::Layout(const Model& model) {
   };
   put(Field::timeStep, 1);
   put(Field::safety, 1);
+  put(Field::threads, 1);
   put(Field::slaveMass, s);
   put(Field::slaveInertia, u);
   put(Field::addedMass, n);

@@ -11,7 +11,7 @@ namespace tiefmu {
 // Fields of the array, 3 doubles an entry for vectors. n: all nodes; r: rotating nodes; s: slaves; u: turning slaves.
 enum class Field : int {
   // parameters
-  timeStep, safety, slaveMass /*s*/, slaveInertia /*u*/,
+  timeStep, safety, threads, slaveMass /*s*/, slaveInertia /*u*/,
   // computed from the parameters at the end of initialisation
   addedMass /*n*/, addedInertia /*r*/, stiffness /*n*/, rotationalStiffness /*r*/,
   // inputs

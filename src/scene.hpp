@@ -61,6 +61,8 @@ struct SceneSpring {
   Vec3 rotationalDamping = Vec3::Zero();    // N m s/rad
 };
 
+constexpr int mostThreads = 256;
+
 struct Settings {
   Inertia inertia = Inertia::lumped;
   Reaction reaction = Reaction::loads;
@@ -70,6 +72,7 @@ struct Settings {
   Method method = Method::centralDifference;
   double timeStep = 0;          // s; 0: safety * limit
   double safety = 0.9;
+  int threads = 1;              // from 1 to mostThreads
   std::vector<std::string> expose, hide;  // names of INTERFACE's last two tables
 };
 

@@ -1,6 +1,7 @@
 #include "simulation.hpp"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <cstdio>
 
@@ -145,12 +146,20 @@ struct Simulation::Impl {
     work[3] = total;
   }
 
+  bool allWithin(std::size_t count, const double* value, double limit) {
+    std::atomic<bool> result{true};
+    dynamics.eachBlock(count, [&](std::size_t first, std::size_t last) {
+      if (!within(last - first, value + first, limit)) result = false;
+    });
+    return result;
+  }
+
   void checkFinite() {
     if (!model->anyFree()) return;
     for (Field f : {Field::velocity, Field::spin}) {
       const double* v = field(f);
       const int last = f == Field::velocity ? model->freeEnd() : model->rotating();
-      if (within(3 * (last - model->freeBegin()), v + 3 * model->freeBegin(), runaway)) continue;
+      if (allWithin(3 * (last - model->freeBegin()), v + 3 * model->freeBegin(), runaway)) continue;
       for (int i = model->freeBegin(); i < last; ++i)
         for (int k = 0; k < 3; ++k) {
           if (std::abs(v[3 * i + k]) < runaway) continue;  // false for NaN
@@ -167,7 +176,7 @@ struct Simulation::Impl {
   // Of all nodes after h more at the present velocities (0: as they stand).
   void checkPlaces(double h) {
     const double *x = field(Field::position), *v = field(Field::velocity);
-    if (h == 0 && within(layout[Field::position].count, x, farAway)) return;
+    if (h == 0 && allWithin(layout[Field::position].count, x, farAway)) return;
     for (std::size_t k = 0; k < layout[Field::position].count; ++k) {
       if (std::abs(x[k] + h * v[k]) < farAway) continue;  // false for NaN
       char text[120];
@@ -187,8 +196,13 @@ struct Simulation::Impl {
   }
 
   void save() {
-    std::copy_n(data.begin() + kept[0].offset, kept[0].count, backup.begin());
-    std::copy_n(data.begin() + kept[1].offset, kept[1].count, backup.begin() + kept[0].count);
+    std::size_t to = 0;
+    for (const Slice& slice : kept) {
+      dynamics.eachBlock(slice.count, [&](std::size_t first, std::size_t last) {
+        std::copy_n(data.begin() + slice.offset + first, last - first, backup.begin() + to + first);
+      });
+      to += slice.count;
+    }
   }
   void undo() {
     dynamics.inputs.at(0, data.data());

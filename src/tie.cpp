@@ -5,14 +5,14 @@
 namespace tiefmu {
 namespace {
 
-const TieKernels& chooseKernels() {
+const TieKernels* fastest() {
 #ifdef TIEFMU_AVX2
-  if (__builtin_cpu_supports("avx2")) return avx2Kernels;
+  if (__builtin_cpu_supports("avx2")) return &avx2Kernels;
 #endif
-  return baselineKernels;
+  return &baselineKernels;
 }
 
-const TieKernels& kernels = chooseKernels();
+const TieKernels* kernels = fastest();
 
 TieView view(const TieGroup& group, SegmentRange range) {
   return {group.coupling, group.corners, range, group.firstSlave, group.node.data(), group.begin.data(), group.weight.data()};
@@ -20,58 +20,63 @@ TieView view(const TieGroup& group, SegmentRange range) {
 
 }  // namespace
 
+bool useBaselineKernels(bool baseline) {
+  kernels = baseline ? &baselineKernels : fastest();
+  return kernels == &baselineKernels;
+}
+
 void follow(const TieGroup& group, SegmentRange range, TieGeometry geometry, const double* u, const double* turn,
             double* us, double* turns) {
-  kernels.follow(view(group, range), geometry, u, turn, us, turns);
+  kernels->follow(view(group, range), geometry, u, turn, us, turns);
 }
 
 void distribute(const TieGroup& group, SegmentRange range, TieGeometry geometry, const double* force,
                 const double* moment, double* f, double* t) {
-  kernels.distribute(view(group, range), geometry, force, moment, f, t);
+  kernels->distribute(view(group, range), geometry, force, moment, f, t);
 }
 
 void addBias(const TieGroup& group, SegmentRange range, TieGeometry geometry, const double* velocity,
              const double* spin, double* as, double* zs) {
-  kernels.addBias(view(group, range), geometry, velocity, spin, as, zs);
+  kernels->addBias(view(group, range), geometry, velocity, spin, as, zs);
 }
 
 void place(const TieGroup& group, SegmentRange range, TieGeometry geometry, const double* position, double* xs) {
-  kernels.place(view(group, range), geometry, position, xs);
+  kernels->place(view(group, range), geometry, position, xs);
 }
 
 bool updateFrames(const TieGroup& group, SegmentRange range, const double* position, SegmentFrame* frame) {
-  return kernels.updateFrames(view(group, range), position, frame);
+  return kernels->updateFrames(view(group, range), position, frame);
 }
 
 void turnOffsets(const TieGroup& group, SegmentRange range, double h, const double* spin, const double* inverseLength2,
                  double* offset) {
-  kernels.turnOffsets(view(group, range), h, spin, inverseLength2, offset);
+  kernels->turnOffsets(view(group, range), h, spin, inverseLength2, offset);
 }
 
 bool moveSegments(const TieGroup& group, SegmentRange range, double h, const double* position, const double* velocity,
                   SegmentFrame* frame, double* rotation) {
-  return kernels.moveSegments(view(group, range), h, position, velocity, frame, rotation);
+  return kernels->moveSegments(view(group, range), h, position, velocity, frame, rotation);
 }
 
 void rotateOffsets(const TieGroup& group, SegmentRange range, const double* rotation, const double* initialOffset,
                    double* offset) {
-  kernels.rotateOffsets(view(group, range), rotation, initialOffset, offset);
+  kernels->rotateOffsets(view(group, range), rotation, initialOffset, offset);
 }
 
 void meanSpin(const TieGroup& group, SegmentRange range, const SegmentFrame* frame, const double* velocity,
               double* spin) {
-  kernels.meanSpin(view(group, range), frame, velocity, spin);
+  kernels->meanSpin(view(group, range), frame, velocity, spin);
 }
 
 void addScaled(std::size_t count, double h, const double* rate, double* value) {
-  kernels.addScaled(count, h, rate, value);
+  kernels->addScaled(count, h, rate, value);
 }
 
 void accelerate(std::size_t nodes, const double* load, const double* reaction, const double* mass, const double* added,
                 double* acceleration) {
-  kernels.accelerate(nodes, load, reaction, mass, added, acceleration);
+  kernels->accelerate(nodes, load, reaction, mass, added, acceleration);
 }
 
-bool within(std::size_t count, const double* value, double limit) { return kernels.within(count, value, limit); }
+bool within(std::size_t count, const double* value, double limit) { return kernels->within(count, value, limit); }
 
 }  // namespace tiefmu

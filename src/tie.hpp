@@ -11,6 +11,10 @@
 
 namespace tiefmu {
 
+// The kernels are built for the baseline of the machine and for AVX2, and the best that it has is used. This chooses the
+// baseline instead, for the whole process (tests; results do not depend on it). Returns whether it is the baseline now.
+bool useBaselineKernels(bool baseline);
+
 // u_s = T u. `u`, `turn`: 3 per node / rotating node (velocity and spin, or acceleration, or displacement and small
 // rotation); writes `us` (3 per slave) and `turns` (3 per turning slave). [seed (4), (5)]
 void follow(const TieGroup& group, SegmentRange range, TieGeometry geometry, const double* u, const double* turn,

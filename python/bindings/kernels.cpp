@@ -72,6 +72,10 @@ Coupling couplingOf(const std::string& name) {
 void bindKernels(nb::module_& parent) {
   nb::module_ m = parent.def_submodule("kernels", "Kernels of the tie on NumPy arrays (SI units).");
 
+  m.def("use_baseline", &useBaselineKernels, "baseline"_a,
+        "Kernels of the baseline instruction set (True) or the best that this machine has, for the whole process. Returns "
+        "whether they are the baseline's now.");
+
   m.def("shape", [](int n, double xi, double eta) {
     if (n != 3 && n != 4) throw nb::value_error("n is 3 or 4");
     const Phi phi = shape(n, xi, eta);

@@ -150,7 +150,7 @@ void addSprings(Scene& scene, const std::string& name, const Indices& a, const I
 
 void setSettings(Scene& scene, const std::string& inertia, const std::string& reaction, const std::string& geometry,
                  const std::string& position, const std::array<double, 3>& gravity, const std::string& method,
-                 double timeStep, double safety, const std::vector<std::string>& expose,
+                 double timeStep, double safety, int threads, const std::vector<std::string>& expose,
                  const std::vector<std::string>& hide) {
   Settings& s = scene.settings;
   s.inertia = choose<Inertia>(inertia, {{"lumped", Inertia::lumped}, {"consistent", Inertia::consistent}});
@@ -165,6 +165,7 @@ void setSettings(Scene& scene, const std::string& inertia, const std::string& re
                                      {"rk4", Method::rk4}});
   s.timeStep = timeStep;
   s.safety = safety;
+  s.threads = threads;
   s.expose = expose;
   s.hide = hide;
 }
@@ -290,6 +291,7 @@ struct FieldName {
 constexpr FieldName fieldNames[] = {
     {Field::timeStep, "time_step", 1},
     {Field::safety, "safety", 1},
+    {Field::threads, "threads", 1},
     {Field::slaveMass, "slave_mass", 1},
     {Field::slaveInertia, "slave_inertia", 1},
     {Field::addedMass, "added_mass", 1},
@@ -447,7 +449,7 @@ NB_MODULE(_core, m) {
            "One spring for each pair of a and b (int32 node indices; b = -1: ground), all of the same kind.")
       .def("set_settings", &setSettings, nb::kw_only(), "inertia"_a = "lumped", "reaction"_a = "loads",
            "geometry"_a = "finite", "position"_a = "integrated", "gravity"_a = std::array<double, 3>{},
-           "method"_a = "central-difference", "time_step"_a = 0.0, "safety"_a = 0.9,
+           "method"_a = "central-difference", "time_step"_a = 0.0, "safety"_a = 0.9, "threads"_a = 1,
            "expose"_a = std::vector<std::string>(), "hide"_a = std::vector<std::string>(),
            "The tables [model], [integrator] and [interface].");
 

@@ -214,7 +214,7 @@ class Assembly:
         scene.set_settings(inertia=model.inertia, reaction=model.reaction, geometry=model.geometry,
                            position=model.position, gravity=si("gravity", model.gravity), method=integrator.method,
                            time_step=si("time_step", integrator.time_step), safety=integrator.safety,
-                           expose=interface.expose, hide=interface.hide)
+                           threads=integrator.threads, expose=interface.expose, hide=interface.hide)
         return scene
 
 

@@ -217,6 +217,7 @@ class Integrator(Table):
     method: Literal["central-difference", "symplectic-euler", "noh-bathe", "rk4"] = "central-difference"
     time_step: NotNegative = 0.0
     safety: Positive = 0.9
+    threads: Annotated[int, Field(ge=1, le=256)] = 1
 
 
 class Interface(Table):
