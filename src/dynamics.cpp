@@ -142,6 +142,10 @@ void Dynamics::prepareMass() {
   if (inertia_) updateInertia();
 }
 
+void Dynamics::updateMass() {
+  if (inertia_ && !inertia_->constant()) updateInertia();
+}
+
 void Dynamics::updateInertia() {
   inertia_->update(model.nodeMass.data(), model.nodeInertia.data(), field(Field::slaveMass),
                    field(Field::slaveInertia), field(Field::offset), frames_);
@@ -326,7 +330,7 @@ void Dynamics::evaluate() {
       at(z, i) = (at(nodeMoment_.data(), i) + at(t, i)) / (model.nodeInertia[i] + inertia[i]);
     return;
   }
-  if (!inertia_->constant()) updateInertia();
+  updateMass();
   std::copy_n(f, right_.size(), right_.begin());
   std::copy_n(t, rightMoment_.size(), rightMoment_.begin());
   if (bias_ || knownAccelerations_) {
