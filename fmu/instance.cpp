@@ -236,6 +236,7 @@ void Instance::get(const fmi2ValueReference refs[], std::size_t count, double va
   try {
     simulation.updateOutputs();
   } catch (const std::exception&) {
+    forRuns(refs, count, [](const Range&, std::uint32_t, std::size_t, std::size_t) {});  // what is refused comes first
     if (state != error) throw;  // there what still can be read is
   }
   const double* data = simulation.data();

@@ -29,9 +29,10 @@ class Writer {
   void number(const T& value) {
     archive(value);
   }
+  // `+values`, no lvalue: of one cereal takes the size of the pointer for that of a number.
   template <class T>
   void numbers(const T* values, std::size_t count) {
-    archive(cereal::binary_data(values, count * sizeof(T)));
+    archive(cereal::binary_data(+values, count * sizeof(T)));
   }
   std::size_t size(std::size_t count) {
     archive(static_cast<std::uint64_t>(count));
@@ -51,7 +52,7 @@ class Reader {
   }
   template <class T>
   void numbers(T* values, std::size_t count) {
-    archive(cereal::binary_data(values, count * sizeof(T)));
+    archive(cereal::binary_data(+values, count * sizeof(T)));
   }
   // Count of elements of at least `bytesEach`; refused before anything is allocated for it.
   std::size_t size(std::size_t, std::size_t bytesEach) {

@@ -173,6 +173,10 @@ void Dynamics::prepareMass() {
   if (inertia_) updateInertia();
 }
 
+void Dynamics::updateMass() {
+  if (inertia_ && !inertia_->constant()) updateInertia();
+}
+
 void Dynamics::updateInertia() {
   inertia_->update(model.nodeMass.data(), model.nodeInertia.data(), field(Field::slaveMass),
                    field(Field::slaveInertia), field(Field::offset), frames_);
@@ -381,7 +385,7 @@ void Dynamics::evaluate() {
     });
     return;
   }
-  if (!inertia_->constant()) updateInertia();
+  updateMass();
   std::copy_n(f, right_.size(), right_.begin());
   std::copy_n(t, rightMoment_.size(), rightMoment_.begin());
   if (bias_ || knownAccelerations_) {

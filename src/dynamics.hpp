@@ -32,6 +32,7 @@ class Dynamics {
   void prepare();       // from the parameters: added inertia, stiffness, then prepareMass. Throws SceneError
   void prepareMass();   // what stands beside the array: geometry and mass matrix. Throws SceneError
   void updateGeometry();
+  void updateMass();    // the mass matrix at the present geometry, as `evaluate` does. Throws SceneError
   // Node ids of a meanMotion segment whose nodes have come to lie on a line, so that its motion is not defined: "1, 2, 3".
   // Empty: none.
   std::string collapsed();

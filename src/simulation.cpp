@@ -117,6 +117,7 @@ struct Simulation::Impl {
     if (!geometryOld) return;
     dynamics.updateGeometry();
     checkSegments();
+    if (flags & accelerationsValid) dynamics.updateMass();  // a restored state: nothing else will
     geometryOld = false;
   }
 

@@ -140,6 +140,9 @@ def test_wrong_inputs(weld, scene_file, capsys, tmp_path, case):
     (["info", "text.fmu"], "text.fmu: not an FMU (a zip archive)"),
     (["run", "text.fmu"], "text.fmu: not an FMU that FMPy can read: File is not a zip file"),
     (["info", "foreign.fmu"], "foreign.fmu: holds no resources/report.json, so it was not made by tiefmu"),
+    (["info", "list.fmu"], "list.fmu: its resources/report.json is none of tiefmu"),
+    (["info", "damaged.fmu"], "damaged.fmu: not an FMU (a zip archive)"),
+    (["run", "damaged.fmu"], "damaged.fmu: cannot be unpacked: Bad CRC-32 for file 'resources/report.json'"),
     (["run", "weld.toml", "--output", "no/out.csv"], "no/out.csv: folder no does not exist"),
     (["run", "weld.toml", "--plot", "no/out.png"], "no/out.png: folder no does not exist"),
     (["build", "weld.toml", "-o", "no/weld.fmu"], "no/weld.fmu: folder no does not exist"),
@@ -152,6 +155,13 @@ def test_wrong_files(weld, scene_file, capsys, tmp_path, arguments, line):
     (tmp_path / "text.fmu").write_text("no archive")
     with zipfile.ZipFile(tmp_path / "foreign.fmu", "w") as archive:
         archive.writestr("modelDescription.xml", "<fmiModelDescription/>")
+    with zipfile.ZipFile(tmp_path / "list.fmu", "w") as archive:
+        archive.writestr("resources/report.json", "[]")
+    model = tiefmu.load(weld).model
+    with zipfile.ZipFile(tmp_path / "damaged.fmu", "w") as archive:
+        archive.writestr("modelDescription.xml", model.xml("weld", "", "{guid}"))
+        archive.writestr("resources/report.json", '{"slaves": []}')
+    (tmp_path / "damaged.fmu").write_bytes((tmp_path / "damaged.fmu").read_bytes().replace(b'{"slaves', b'{"salves'))
     before = sorted(tmp_path.rglob("*"))
     assert main(arguments) == 2
     said = capsys.readouterr()

@@ -174,6 +174,7 @@ def test_status_of_a_step(fmu):
     assert instance.call("GetBooleanStatus", 3, byref(over)) == OK and over.value == 0
     assert instance.call("GetRealStatus", 0, byref(time)) == DISCARD and time.value == 1.25
     assert instance.call("GetStringStatus", 1, byref(c_char_p())) == DISCARD
+    assert {instance.call(name, 0, byref(c_int())) for name in ("GetStatus", "GetIntegerStatus")} == {DISCARD}
     instance.free()
 
 
@@ -503,6 +504,8 @@ def test_driven_nodes_put_into_one_point(tmp_path):
         instance = Instance(squashed).start()
         state = instance.save()
         assert instance.set(point) == OK
+        assert instance.get_references([2**31])[0] == ERROR  # refused before anything is computed
+        assert instance.errors()[-1].startswith("fmi2GetReal: unknown value reference")
         assert use(instance) == ERROR and "segment of nodes 1, 2, 3, 4 has collapsed" in instance.errors()[-1]
         assert instance.restore(state) == OK and instance.get_references(output)[0] == OK
         assert instance.step(0, 0.1) == OK

@@ -71,6 +71,20 @@ def test_a_derivative_changes_nothing_that_follows(fmu):
     one.free(), other.free()
 
 
+def test_a_restored_state_has_the_derivatives_that_it_had(fmu):
+    """The mass matrix, too, is again that of the restored geometry."""
+    outputs, inputs = fmu.names("output"), fmu.names("input")
+    instance = started(fmu)
+    before = directional(instance, outputs, inputs, np.ones(len(inputs)))
+    state = instance.save()
+    for k in range(1, 11):
+        assert instance.step(0.01 + 0.05 * (k - 1), 0.05) == OK
+    assert abs(directional(instance, outputs, inputs, np.ones(len(inputs))) - before).max() > 1e-3
+    assert instance.restore(state) == OK
+    np.testing.assert_array_equal(directional(instance, outputs, inputs, np.ones(len(inputs))), before)
+    instance.free()
+
+
 def test_directions_add_up_where_an_input_is_named_twice(fmu):
     outputs, inputs = fmu.names("output"), fmu.names("input")
     instance = started(fmu)

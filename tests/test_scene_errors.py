@@ -2,6 +2,7 @@
 
 import copy
 import os
+from pathlib import Path
 
 import pytest
 
@@ -438,6 +439,17 @@ def test_torsion_on_what_cannot_turn(weld, scene_file, capsys):
     weld["spring"] = [{"nodes": [101, 1], "kind": "bushing", "rotational_stiffness": 1.0}]
     assert line_of(scene_file, capsys, weld) == "spring 1: slave 101 cannot take a moment: the nodes of segment 1 of " \
         "tie 'weld' have no rotations; use formulation = \"optimized\""
+
+
+@pytest.mark.parametrize("number", [2**63, 2**64, 10**30])
+def test_ids_of_a_gmsh_file_that_are_too_large(number, weld, scene_file, tmp_path):
+    text = (Path(__file__).parent / "fuzz" / "corpus" / "scene" / "panel_2.msh").read_text()
+    (tmp_path / "panel.msh").write_text(text.replace("\n72 3 2 ", f"\n{number} 3 2 "))
+    weld["mesh"] = {"file": "panel.msh"}
+    with pytest.raises(tiefmu.SceneError) as error:
+        tiefmu.load(scene_file(weld))
+    assert str(error.value) == ("weld.toml: mesh: file: panel.msh: "
+                                f"segment {number}: ids are less than 9223372036854775808")
 
 
 @pytest.mark.parametrize("file, line", [("..", "no such file"), ("a" * 300, "File name too long")])

@@ -236,6 +236,9 @@ def gmsh_tags(path: Path, nodes: int, counts: dict[str, int]):
         return None
     if len(node_tags) != nodes or any(len(element_tags[kind]) != counts[kind] for kind in CORNERS):
         return None
+    for what, tags in ("node", node_tags), *(("segment", element_tags[kind]) for kind in CORNERS):
+        if max(tags, default=1) >= 2**63:
+            raise SceneError(f"{what} {max(tags)}: ids are less than {2**63}")
     return np.array(node_tags), element_tags
 
 

@@ -136,11 +136,16 @@ def of_fmu(path: Path) -> dict:
     """The report that an FMU carries; SceneError if it is none of ours."""
     try:
         with zipfile.ZipFile(path) as archive:
-            return json.loads(archive.read("resources/report.json"))
+            found = json.loads(archive.read("resources/report.json"))
     except KeyError:
         raise SceneError(f"{path}: holds no resources/report.json, so it was not made by tiefmu") from None
-    except (zipfile.BadZipFile, ValueError):
+    except OSError as error:
+        raise SceneError(f"{path}: {error.strerror}") from None
+    except Exception:  # damaged archives raise many kinds
         raise SceneError(f"{path}: not an FMU (a zip archive)") from None
+    if not isinstance(found, dict) or "slaves" not in found:
+        raise SceneError(f"{path}: its resources/report.json is none of tiefmu")
+    return found
 
 
 # ------------------------------------------------------------------------------------------------------------- as text

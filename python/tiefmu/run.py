@@ -67,7 +67,10 @@ def run(fmu: Path, stop_time: float | None = None, step: float | None = None, in
             reached = time
             return True
 
-        fmpy.extract(str(fmu), folder)
+        try:
+            fmpy.extract(str(fmu), folder)
+        except Exception as error:
+            raise RunError(f"{name}: cannot be unpacked: {one_line(error)}") from None
         try:
             with contextlib.redirect_stdout(io.StringIO()):  # FMPy prints a line for each input that gets no column
                 return fmpy.simulate_fmu(folder, validate=False, model_description=description,

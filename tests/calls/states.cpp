@@ -10,7 +10,8 @@ void testStates(const Packed& packed) {
       bring(undisturbed, state);
       const fmi2Status status = r.call(session);
       if (r.with(state)) {
-        require(status == fmi2OK || status == fmi2Discard, where + ": refused: " + (session.log.empty() ? "" : session.log[0].text));
+        require(status == fmi2OK || status == fmi2Discard,
+                where + ": refused: " + (session.log.empty() ? "" : session.log[0].text));
         require(session.log.empty(), where + ": a message, but no error");
         continue;
       }
