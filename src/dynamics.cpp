@@ -131,9 +131,7 @@ void Dynamics::startThreads() {
   if (!(threads >= 1 && threads <= mostThreads && threads == std::floor(threads)))
     throw SceneError("integrator.threads is " + number(threads) + "; it must be a whole number from 1 to " +
                      std::to_string(mostThreads));
-  const bool parts = std::any_of(model.groups.begin(), model.groups.end(),
-                                 [](const TieGroup& group) { return group.partEnd.size() > 1; });
-  const int wanted = parts ? static_cast<int>(threads) : 1;
+  const int wanted = model.shareable() ? static_cast<int>(threads) : 1;
   if (wanted == (workers_ ? workers_->threads() : 1)) return;
   workers_.reset();
   if (wanted == 1) return;

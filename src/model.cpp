@@ -502,6 +502,10 @@ bool Model::anyDriven() const {
   return false;
 }
 
+bool Model::shareable() const {
+  return std::any_of(groups.begin(), groups.end(), [](const TieGroup& g) { return g.partEnd.size() > 1; });
+}
+
 bool Model::exposes(const char* name) const {
   return std::find(settings.expose.begin(), settings.expose.end(), name) != settings.expose.end();
 }

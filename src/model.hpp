@@ -116,6 +116,7 @@ struct Model {
 
   bool needsPositions() const;     // node positions are states (or inputs)
   bool finite() const { return settings.geometry == Geometry::finite; }
+  bool shareable() const;          // large enough that threads find parts to share
   bool accelerationInputs() const { return settings.reaction != Reaction::loads; }
 };
 

@@ -121,21 +121,33 @@ def threads_now() -> int:
     return len(list(Path(f"/proc/{os.getpid()}/task").iterdir()))
 
 
-def test_threads_end_with_their_instance(tmp_path):
-    tiefmu.build(tiefmu.load(panel("default", False, "free", integrator={"threads": 4})), tmp_path / "panel.fmu")
-    description = fmpy.read_model_description(tmp_path / "panel.fmu")
-    folder = fmpy.extract(str(tmp_path / "panel.fmu"), str(tmp_path / "panel"))
+@pytest.fixture(scope="module")
+def large(tmp_path_factory):
+    """An unpacked FMU that threads can share, and its description."""
+    folder = tmp_path_factory.mktemp("large")
+    scene_ = panel("default", False, "free", side=46, integrator={"threads": 4}, interface={"hide": ["master.f_ext"]})
+    tiefmu.build(tiefmu.load(scene_), folder / "panel.fmu")
+    return fmpy.extract(str(folder / "panel.fmu"), str(folder / "panel")), fmpy.read_model_description(
+        folder / "panel.fmu", validate=False)
+
+
+def started(large, threads: int):
+    folder, description = large
+    fmu = fmpy.fmi2.FMU2Slave(guid=description.guid, unzipDirectory=folder, instanceName="panel",
+                              modelIdentifier=description.coSimulation.modelIdentifier)
+    fmu.instantiate()
+    fmu.setupExperiment()
+    reference = next(v.valueReference for v in description.modelVariables if v.name == "integrator.threads")
+    fmu.setReal([reference], [float(threads)])
+    fmu.enterInitializationMode()
+    fmu.exitInitializationMode()
+    fmu.doStep(0.0, 0.01)
+    return fmu
+
+
+def test_threads_end_with_their_instance(large):
     before = threads_now()
-    instances = []
-    for k in range(2):
-        fmu = fmpy.fmi2.FMU2Slave(guid=description.guid, unzipDirectory=folder, instanceName=f"panel {k}",
-                                  modelIdentifier=description.coSimulation.modelIdentifier)
-        fmu.instantiate()
-        fmu.setupExperiment()
-        fmu.enterInitializationMode()
-        fmu.exitInitializationMode()
-        fmu.doStep(0.0, 0.01)
-        instances.append(fmu)
+    instances = [started(large, 4), started(large, 4)]
     assert threads_now() == before + 6
     instances[0].reset()
     assert threads_now() == before + 3
@@ -144,19 +156,21 @@ def test_threads_end_with_their_instance(tmp_path):
     assert threads_now() == before
 
 
-def test_threads_are_a_parameter_of_the_fmu(tmp_path):
-    tiefmu.build(tiefmu.load(panel("default", False, "free", side=6)), tmp_path / "panel.fmu")
-    variable = next(v for v in fmpy.read_model_description(tmp_path / "panel.fmu").modelVariables
-                    if v.name == "integrator.threads")
-    assert (variable.causality, variable.variability, float(variable.start)) == ("parameter", "fixed", 1.0)
-    one, two = (fmpy.simulate_fmu(str(tmp_path / "panel.fmu"), stop_time=0.01, output_interval=0.001,
-                                  start_values={"integrator.threads": threads}) for threads in (1, 2))
-    assert np.array_equal(one, two)
+def test_threads_are_a_parameter_of_the_fmu(large):
+    variable = next(v for v in large[1].modelVariables if v.name == "integrator.threads")
+    assert (variable.causality, variable.variability, float(variable.start)) == ("parameter", "fixed", 4.0)
+    outputs = [v.valueReference for v in large[1].modelVariables if v.causality == "output"]
+    values = []
+    for threads in (1, 2):
+        fmu = started(large, threads)
+        values.append(fmu.getReal(outputs))
+        fmu.freeInstance()
+    assert values[0] == values[1] and len(values[0]) > 20000
 
 
 @pytest.mark.parametrize("threads", [0, -1, 1.5, 257, float(2**40)])
 def test_numbers_of_threads_that_make_no_sense(tmp_path, threads):
-    tiefmu.build(tiefmu.load(panel("default", False, "free", side=4)), tmp_path / "panel.fmu")
+    tiefmu.build(tiefmu.load(panel("default", False, "free", side=4, integrator={"threads": 2})), tmp_path / "panel.fmu")
     said = []
     with pytest.raises(Exception):
         fmpy.simulate_fmu(str(tmp_path / "panel.fmu"), stop_time=0.01, start_values={"integrator.threads": threads},
