@@ -37,6 +37,7 @@ class Analysis {
   void rows(const Block& block);
   void nodeRows(const Block& block);
   void slaveRows(const Block& block);
+  void portRows(const Block& block);
 
   const Model& model;
   const std::vector<Block>& blocks;
@@ -196,9 +197,10 @@ void Analysis::nodeRows(const Block& block) {
 
 void Analysis::slaveRows(const Block& block) {
   List v, w, x, a;
-  const std::size_t last = out.all.size() + block.count();
+  const int first = static_cast<int>((block.place - layout[block.field].offset) / block.components);
+  const int last = first + static_cast<int>(block.numbers.size());
   influences.eachSegment([&](const Segment& s) {
-    for (int slave = s.first; slave < s.last && out.all.size() < last; ++slave) {
+    for (int slave = std::max(s.first, first); slave < std::min(s.last, last); ++slave) {
       for (List* list : {&v, &w, &x, &a}) list->clear();
       if (block.field == Field::slaveAcceleration)
         influences.acceleration(s, slave, a);
@@ -217,8 +219,25 @@ void Analysis::slaveRows(const Block& block) {
   });
 }
 
+void Analysis::portRows(const Block& block) {
+  const bool inertial = model.settings.reaction != Reaction::loads;
+  const bool driven = block.field == Field::portReaction || block.field == Field::portReactionMoment;
+  const bool known = block.field != Field::portPosition;  // which is a state
+  for (std::size_t e = 0; e < block.numbers.size(); ++e) {
+    Influences::Resultant sum;
+    if (known) sum = driven ? influences.resultant(e, inertial) : influences.means[e];
+    const bool first = block.field == Field::portReaction || block.field == Field::portMeanVelocity;
+    for (int k = 0; k < block.components; ++k) {
+      startRow();
+      collect(first ? sum.force : sum.moment, k, Dependence::constant, true);
+      finishRow();
+    }
+  }
+}
+
 void Analysis::rows(const Block& block) {
   const bool unknown = block.causality == Causality::output || block.causality == Causality::calculatedParameter;
+  if (unknown && block.prefix == "port") return portRows(block);
   if (unknown && block.prefix == "slave") return slaveRows(block);
   if (unknown && !block.prefix.empty()) return nodeRows(block);
   for (std::size_t i = 0; i < block.count(); ++i) {

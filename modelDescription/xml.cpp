@@ -96,12 +96,12 @@ struct Place {  // of an element in the listing
   std::uint32_t block, element;
 };
 
-// Elements as a person reads them: first what belongs to no node, then masters, slaves, points by number.
+// Elements as a person reads them: first what belongs to no node, then ports, masters, slaves, points by number.
 std::vector<Place> listing(const std::vector<Block>& blocks) {
   std::vector<Place> places;
   for (std::uint32_t b = 0; b < blocks.size(); ++b) {
     const std::string& prefix = blocks[b].prefix;
-    const int order = prefix.empty() ? 0 : prefix == "master" ? 1 : prefix == "slave" ? 2 : 3;
+    const int order = prefix.empty() ? 0 : prefix == "port" ? 1 : prefix == "master" ? 2 : prefix == "slave" ? 3 : 4;
     for (std::uint32_t e = 0; e < blocks[b].numbers.size(); ++e)
       places.push_back({order, blocks[b].numbers[e], b, e});
   }
@@ -188,8 +188,7 @@ void appendVariables(std::string& out, const std::vector<Block>& blocks, const s
       out += "\" description=\"";
       out += b.description;
       if (!b.prefix.empty()) {
-        out += " (node ";
-        out += std::to_string(b.ids[p.element]);
+        out += b.labels.empty() ? " (node " + std::to_string(b.ids[p.element]) : " (port " + b.labels[p.element];
         out += ')';
       }
       out += tails[p.block];
@@ -313,7 +312,8 @@ std::string xml(const Model& model, const Description& description) {
   for (const Block& b : blocks) count += b.count();
 
   std::string out;
-  appendHead(out, description, count <= mostStructuredNames);
+  // Structured names have numbers in brackets, where ports have names.
+  appendHead(out, description, count <= mostStructuredNames && model.ports.empty());
   appendDefinitions(out);
   const Experiment experiment = defaultExperiment(model, simulation);
   out += "<DefaultExperiment startTime=\"0\" stopTime=\"";

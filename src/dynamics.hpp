@@ -8,6 +8,7 @@
 #include "inertia.hpp"
 #include "input_curve.hpp"
 #include "layout.hpp"
+#include "port.hpp"
 #include "spring.hpp"
 #include "tie.hpp"
 
@@ -49,10 +50,13 @@ class Dynamics {
   void drift(double h, double ahead);
   // d/dt of the fields velocity .. work at the present state, for a Runge-Kutta stage. `rates` starts at velocity.
   void rates(double* rates);
-  // Inputs that move inside the step; no-ops where none does. Before a drift their mean over it, after it their end.
+  // Inputs and ports that move inside the step; no-ops where none does. Before a drift from tau to tau + h the
+  // inputs' mean over it, after it their end.
   InputCurve inputs;
+  Ports ports;
   void inputsOver(double tau, double h);
-  void inputsAt(double tau);
+  void inputsAt(double tau, double h);
+  void movePorts();  // the ports' nodes, after inputs have changed
   void normalise();  // offsets and rotations back to their length after a Runge-Kutta step
 
   // Outputs at the present state. `evaluate` (or evaluateReactions) must be up to date.

@@ -61,6 +61,15 @@ struct SceneSpring {
   Vec3 rotationalDamping = Vec3::Zero();    // N m s/rad
 };
 
+// Nodes that the interface shows as one rigid body: driven ones that it moves, or slaves that it loads.
+struct ScenePort {
+  std::string name;
+  std::vector<int> nodes;
+  bool listed = false;      // by ids: each must be part of the model; of a set those that are not are passed over
+  bool atMean = true;       // reference point: the mean of its nodes' positions, or `at`
+  Vec3 at = Vec3::Zero();   // m
+};
+
 struct Settings {
   Inertia inertia = Inertia::lumped;
   Reaction reaction = Reaction::loads;
@@ -78,6 +87,7 @@ struct Scene {
   SceneSegments segments;
   std::vector<SceneTie> ties;
   std::vector<SceneSpring> springs;
+  std::vector<ScenePort> ports;
   Settings settings;
 };
 

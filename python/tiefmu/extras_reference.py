@@ -48,7 +48,8 @@ def names(block: dict) -> list[str]:
     components = [f"[{k}]" for k in (1, 2, 3)] if block["components"] == 3 else [""]
     if not block["prefix"]:
         return [block["name"]]
-    return [f"{block['prefix']}[{number}].{name}{k}" for number in block["numbers"].tolist() for k in components]
+    return [f"{block['prefix']}[{number}].{name}{k}" for number in block["labels"] or block["numbers"].tolist()
+            for k in components]
 
 
 def signals(scene: Scene, times: np.ndarray) -> dict[str, np.ndarray]:

@@ -23,6 +23,7 @@ def report(scene: Scene) -> dict:
     found = scene.model.report()
     slaves, nodes = found["slaves"], found["nodes"]
     by_id = np.argsort(slaves["id"], kind="stable")
+    ports = {"ports": port_rows(scene, found)} if found["ports"] else {}
     return {
         "title": scene.title,
         "ties": ties(scene, found),
@@ -40,7 +41,7 @@ def report(scene: Scene) -> dict:
         "integrator_limit": scene.start.integrator_limit,
         "freedoms": freedoms(scene, nodes),
         "variables": variable_counts(scene),
-    }
+    } | ports
 
 
 def ties(scene: Scene, found: dict) -> list[dict]:
@@ -109,6 +110,31 @@ def node_rows(scene: Scene, nodes: dict, master: bool) -> list[dict]:
     return rows
 
 
+def port_rows(scene: Scene, found: dict) -> list[dict]:
+    """One row a port, in the scene's order. Of driven nodes also what the tie adds to them, as one body: its mass, the
+    centre of that mass and the moments and products of inertia about it (xx, yy, zz, yz, zx, xy), at the start."""
+    nodes, rows = found["nodes"], []
+    added_mass, added_inertia = scene.start.get("added_mass"), scene.start.get("added_inertia")
+    index = dict(zip(nodes["id"].tolist(), range(len(nodes["id"]))))
+    for port in sorted(found["ports"], key=lambda port: port["number"]):
+        ids = np.sort(port["ids"])
+        row = {"name": port["name"], "moves": "slaves" if port["of_slaves"] else "driven nodes", "at": port["at"],
+               "nodes": ids.tolist()}
+        if not port["of_slaves"]:
+            own = np.array([index[i] for i in ids.tolist()])
+            mass, position = added_mass[own], nodes["position"][own]
+            total = float(mass.sum())
+            centre = mass @ position / total if total > 0 else np.array(port["at"])
+            arm = position - centre
+            tensor = np.einsum("n,nij->ij", mass, (arm**2).sum(axis=1)[:, None, None] * np.eye(3)
+                               - arm[:, :, None] * arm[:, None, :])
+            tensor += added_inertia[own[own < nodes["rotating"]]].sum() * np.eye(3)
+            row |= {"added_mass": total, "added_centre": centre.tolist(),
+                    "added_inertia": [float(tensor[i, j]) for i, j in ((0, 0), (1, 1), (2, 2), (1, 2), (2, 0), (0, 1))]}
+        rows.append(row)
+    return rows
+
+
 def nodal_step(mass: float, stiffness: float) -> float:
     """Seed (3): sqrt(2 m/K); 1e30 where nothing limits it."""
     return (2 * mass / stiffness)**0.5 if stiffness > 0 else 1e30
@@ -161,6 +187,7 @@ def text(name: str, found: dict) -> str:
     lines += ["", *slave_text(found["slaves"])]
     lines += node_text("master", found["masters"])
     lines += node_text("point", found["points"])
+    lines += port_text(found.get("ports", []))
     lines += ["steps", f"  stable  {step(found['stable_time_step'])}   2/omega_max of the assembled system",
               f"  nodal   {step(found['nodal_time_step'])}   smallest sqrt(2 m/K) of the free nodes",
               f"  method  {step(found['integrator_limit'])}   limit of the chosen integrator", ""]
@@ -204,9 +231,20 @@ def node_text(what: str, nodes: list[dict]) -> list[str]:
     return [*lines, *more(nodes, what + "s"), ""]
 
 
+def port_text(ports: list[dict]) -> list[str]:
+    lines = []
+    for row in ports[:SHOWN]:
+        what = "slave" if row["moves"] == "slaves" else "driven node"
+        added = f", added mass {row['added_mass']:.5g} kg" if "added_mass" in row else ""
+        lines.append(f"port '{row['name']}': {counted(len(row['nodes']), what)} about "
+                     f"[{', '.join(f'{x:.6g}' for x in row['at'])}] m{added}")
+    return [*lines, *more(ports, "ports"), ""] if ports else []
+
+
 def summary(found: dict) -> str:
     """How much of everything, in one line."""
-    return ", ".join([*(counted(len(found[f"{what}s"]), what) for what in ("tie", "slave", "master", "point")),
+    whats = ["tie", "slave", "master", "point"] + (["port"] if "ports" in found else [])
+    return ", ".join([*(counted(len(found[f"{what}s"]), what) for what in whats),
                       counted(found["springs"], "spring"), counted(sum(found["variables"].values()), "variable")])
 
 
