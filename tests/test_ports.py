@@ -501,3 +501,25 @@ def test_units_and_hidden_variables():
     assert tiefmu.report(scene)["ports"][0]["at"] == [1.0, 0.5, 0.2]
     listed = {name for block in scene.start.variables for name in names(block)}
     assert "port[rod].v[1]" in listed and "port[rod].w[1]" not in listed
+
+
+@pytest.mark.parametrize("settings", [s for s in SETTINGS if s[2:] == ("consistent", "full", "finite")
+                                      or s[2:] == ("consistent", "split", "finite")], ids=lambda s: "-".join(map(str, s)))
+def test_the_energy_balance_closes_with_the_order_of_the_method(settings):
+    """Work of ports that turn and are loaded, beside free masters, springs, dampers and gravity."""
+    made = ported(np.random.default_rng(5), settings, motions="mixed")
+    made["integrator"] = {"method": "rk4"}
+    motions = np.random.default_rng(7).normal(size=(4, 3))
+
+    def residual(steps):
+        simulation = tiefmu.load(made).simulation()
+        vector(simulation, "port[base].v", motions[0]), vector(simulation, "port[base].w", motions[1])
+        simulation.initialise(0.0)
+        vector(simulation, "port[load].f", motions[2]), vector(simulation, "port[load].t", motions[3])
+        for _ in range(steps):
+            simulation.step(1 / steps)
+        energy = simulation.get("energy")
+        assert energy[0] > 100
+        return abs(energy[4])
+    coarse, fine, finest = residual(100), residual(200), residual(400)
+    assert finest < 1e-9 and np.log2(coarse / fine) > 3.4 and np.log2(fine / finest) > 3.6
