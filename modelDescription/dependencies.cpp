@@ -11,6 +11,9 @@ namespace {
 // Beyond these an unknown is taken to depend on everything: lists of that length help no importer.
 constexpr std::size_t mostEntriesPerRow = 5000;
 constexpr std::size_t mostEntriesPerClass = 1000000;  // unknowns of a class times their knowns
+// So is one that depends on nearly everything: an absent list says so (FMI 2.0.4, 2.2.8).
+constexpr std::size_t longRow = 1000;
+constexpr double nearlyAll = 0.9;
 
 Dependence kindOf(Pattern p, int bit) {
   return p.moving >> bit & 1     ? Dependence::dependent
@@ -44,6 +47,7 @@ class Analysis {
   const Layout layout;
   const Influences influences;
   const std::uint32_t references;
+  std::size_t inputs = 0;
 
   // Accelerations that a mass matrix couples form a class: they depend on the same knowns.
   std::vector<std::uint32_t> parent;  // union-find over 6 freedoms of each free node
@@ -166,7 +170,8 @@ void Analysis::collect(const List& list, int component, Dependence least, bool a
 }
 
 void Analysis::finishRow() {
-  const bool all = rowIsAll || row.size() > mostEntriesPerRow;
+  const bool dense = row.size() > longRow && static_cast<double>(row.size()) > nearlyAll * static_cast<double>(inputs);
+  const bool all = rowIsAll || dense || row.size() > mostEntriesPerRow;
   if (!all) out.entries.insert(out.entries.end(), row.begin(), row.end());
   out.all.push_back(all);
   out.begin.push_back(out.entries.size());
@@ -251,6 +256,8 @@ Dependencies Analysis::run() {
   stampOf.assign(references, 0);
   placeOf.resize(references);
   out.begin.push_back(0);
+  for (const Block& b : blocks)
+    if (b.causality == Causality::input) inputs += b.count();
   findClasses();
   for (const Block& b : blocks) rows(b);
   return std::move(out);

@@ -84,7 +84,7 @@ Dynamics::Dynamics(const Model& m, const Layout& l, double* d) : model(m), layou
     rightMoment_.resize(3 * r);
   }
   if (small) displacement_.resize(3 * n);
-  if (consistent && model.anyFree()) inertia_ = std::make_unique<ConsistentInertia>(model);
+  if (consistent && model.anyFree()) inertia_ = ConsistentInertia::of(model);
 }
 
 TieGeometry Dynamics::geometry(std::size_t g) const {
@@ -647,16 +647,11 @@ void Dynamics::springOperator(const double* u, const double* turn, double* f, do
   });
 }
 
-void Dynamics::solveInertia(double* f, double* t) {
+void Dynamics::solveInertia(const double* f, const double* t, double* a, double* z) {
   const int first = model.freeBegin(), last = model.freeEnd(), turning = model.rotating();
-  if (inertia_) {
-    std::copy_n(f, right_.size(), right_.begin());
-    std::copy_n(t, rightMoment_.size(), rightMoment_.begin());
-    inertia_->solve(right_.data() + 3 * first, rightMoment_.data() + 3 * first, f + 3 * first, t + 3 * first);
-    return;
-  }
-  for (int i = first; i < last; ++i) at(f, i) /= model.nodeMass[i] + field(Field::addedMass)[i];
-  for (int i = first; i < turning; ++i) at(t, i) /= model.nodeInertia[i] + field(Field::addedInertia)[i];
+  if (inertia_) return inertia_->solve(f + 3 * first, t + 3 * first, a + 3 * first, z + 3 * first);
+  for (int i = first; i < last; ++i) at(a, i) = at(f, i) / (model.nodeMass[i] + field(Field::addedMass)[i]);
+  for (int i = first; i < turning; ++i) at(z, i) = at(t, i) / (model.nodeInertia[i] + field(Field::addedInertia)[i]);
 }
 
 }  // namespace tiefmu

@@ -74,8 +74,8 @@ class Dynamics {
   // Restoring loads K u (or damping C u) of the springs for a motion of the free nodes: u 3 per node, turn 3 per
   // rotating node, zero where not free; f, t likewise.
   void springOperator(const double* u, const double* turn, double* f, double* t, bool damping);
-  // M^-1 of the free nodes, in place on node arrays.
-  void solveInertia(double* f, double* t);
+  // M^-1 of the free nodes, on node arrays: loads f, t to accelerations a, z, which hold a guess on entry.
+  void solveInertia(const double* f, const double* t, double* a, double* z);
 
   // Change of every output, in `dot` laid out like `data`, with the inputs' change given there. Outputs must be up to
   // date. Allocates at the first call.

@@ -499,22 +499,21 @@ NB_MODULE(_core, m) {
   nb::class_<Model>(m, "Model", "A scene searched, checked and sorted. Constant.")
       .def(nb::new_(&compileScene), "scene"_a, "Raises SceneError.")
       .def("report", &report, "What there is to tell: arrays over slaves and nodes in the model's order, findings.")
-      .def("xml",
-           [](const Model& model, const std::string& name, const std::string& title, const std::string& guid) {
-             Description d;
-             d.name = name;
-             d.title = title;
-             d.guid = guid;
-             const std::string text = xml(model, d);
-             return nb::bytes(text.data(), text.size());
-           },
-           "name"_a, "title"_a, "guid"_a, "modelDescription.xml of the FMU, as bytes.")
       .def("resource",
            [](const Model& model, const std::string& guid) {
              const std::string bytes = writeResource(model, guid);
              return nb::bytes(bytes.data(), bytes.size());
            },
            "guid"_a, "resources/scene.bin of the FMU, as bytes.");
+  nb::class_<Xml>(m, "Description", "modelDescription.xml of a model's FMU. Analysed once.")
+      .def(nb::init<const Model&, std::string, std::string>(), nb::keep_alive<1, 2>(), "model"_a, "name"_a, "title"_a,
+           "name: of the scene; title: free text. Raises SceneError where the model cannot start.")
+      .def("write",
+           [](const Xml& description, const std::string& guid, nb::callable sink) {
+             description.write(guid, [&](std::string_view text) { sink(nb::bytes(text.data(), text.size())); });
+           },
+           "guid"_a, "sink"_a, "Calls sink(bytes) with the text, piece by piece.")
+      .def_prop_ro("step_size", &Xml::stepSize, "Of the default experiment, s.");
   m.def("model_identifier", &modelIdentifier, "name"_a, "The C identifier that an FMU of this name uses.");
 
   nb::class_<Simulation::State>(m, "State", "A saved state; only for `restore` of a simulation of the same model.")

@@ -9,6 +9,7 @@ import numpy as np
 from .scene import MOTIONS, Scene
 from ._core import SceneError
 
+MANY_VARIABLES = 10_000  # importers read them in seconds, masters connect them in minutes
 SHOWN = 20  # slaves, masters, points and ids that the text shows; the dict has all
 
 
@@ -24,6 +25,7 @@ def report(scene: Scene) -> dict:
     slaves, nodes = found["slaves"], found["nodes"]
     by_id = np.argsort(slaves["id"], kind="stable")
     ports = {"ports": port_rows(scene, found)} if found["ports"] else {}
+    variables = variable_counts(scene)
     return {
         "title": scene.title,
         "ties": ties(scene, found),
@@ -34,13 +36,13 @@ def report(scene: Scene) -> dict:
         "dropped": [{"id": number, "tie": scene.ties[tie].name, "reason": reason}
                     for number, tie, reason in found["dropped"]],
         "left_out": found["left_out"].tolist(),
-        "warnings": found["warnings"],
+        "warnings": found["warnings"] + size_warning(sum(variables.values())),
         "notes": [*scene.notes, *found["notes"]],
         "stable_time_step": scene.start.get("stable_time_step").tolist()[0],
         "nodal_time_step": scene.start.get("nodal_time_step").tolist()[0],
         "integrator_limit": scene.start.integrator_limit,
         "freedoms": freedoms(scene, nodes),
-        "variables": variable_counts(scene),
+        "variables": variables,
     } | ports
 
 
@@ -156,6 +158,13 @@ def variable_counts(scene: Scene) -> dict:
     for block in scene.start.variables:
         counts[block["name"]] = counts.get(block["name"], 0) + len(block["numbers"]) * block["components"]
     return counts
+
+
+def size_warning(variables: int) -> list[str]:
+    if variables <= MANY_VARIABLES:
+        return []
+    return [f"interface: {variables} variables; many importers and masters take minutes over more than {MANY_VARIABLES}; "
+            "'ports' in [interface] makes the nodes of a set one rigid port of 12 variables"]
 
 
 def of_fmu(path: Path) -> dict:
