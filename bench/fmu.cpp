@@ -2,6 +2,7 @@
 #include <dlfcn.h>
 
 #include <algorithm>
+#include <cstdarg>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
@@ -21,7 +22,11 @@ using bench::best, bench::now, bench::row;
 using References = std::vector<fmi2ValueReference>;
 
 void logMessage(void*, const char*, fmi2Status, const char*, const char* message, ...) {
-  std::fprintf(stderr, "%s\n", message);
+  va_list arguments;
+  va_start(arguments, message);
+  std::vfprintf(stderr, message, arguments);
+  va_end(arguments);
+  std::fputc('\n', stderr);
 }
 
 [[noreturn]] void fail(const char* what) {

@@ -5,7 +5,7 @@
 //                                  slave motion. CASE: default, default-rotations, optimized, or these with -consistent
 //   tiefmu_bench cycles CASE N COUNT   that many cycles and no timing, for instruction counts
 //   tiefmu_bench memory CASE N     bytes per slave of an FMU's simulation, its model included
-//   tiefmu_bench search N          both searches of N slaves on N/4 segments
+//   tiefmu_bench search N [shuffled]   both searches of N slaves on N/4 segments
 //   tiefmu_bench fmu FOLDER NOTHING   calls of an unpacked FMU (FOLDER holds binaries/, resources/), beside those of
 //                                  the library NOTHING, which does nothing
 #include <malloc.h>
@@ -173,22 +173,23 @@ void memory(const Case& what, int slaves) {
                (used() - compiled) / n);
 }
 
-void search(int slaves) {
-  const Scene scene = surface(Case("default-rotations"), slaves, true);
+void search(int slaves, bool shuffled) {
+  const Scene scene = surface(Case("default-rotations"), slaves, shuffled);
   const std::vector<int>& wanted = scene.ties[0].slaves;
   for (const SearchMethod method : {SearchMethod::box, SearchMethod::nearestNode}) {
-    int found = 0;
+    std::size_t found = 0;
     const double seconds = best([&] {
       found = 0;
       const SegmentSearch search(scene.nodes.position, scene.segments.nodes, scene.segments.id);
+      const double reach = search.defaultDistance();
       for (int s : wanted) {
         const Vec3& x = scene.nodes.position[s];
-        const double reach = search.defaultDistance();
         found += (method == SearchMethod::box ? search.box(x, reach) : search.nearestNode(x, 2 * reach)).segment >= 0;
       }
-    }, 0.2);
-    if (found != static_cast<int>(wanted.size())) std::exit(1);
-    row(method == SearchMethod::box ? "search-box" : "search-nearest-node", wanted.size(), 1, seconds, "s");
+    }, 0.05, 3);
+    if (found != wanted.size()) std::exit(1);
+    const std::string name = method == SearchMethod::box ? "search-box" : "search-nearest-node";
+    row((name + (shuffled ? "-shuffled" : "")).c_str(), found, 1, seconds, "s");
   }
 }
 
@@ -204,11 +205,11 @@ int main(int argc, char** argv) {
     Cycle cycle(Case(argv[2]), std::atoi(argv[3]), false);
     for (int k = std::atoi(argv[4]); k > 0; --k) cycle();
   } else if (what == "memory" && argc > 3) memory(Case(argv[2]), std::atoi(argv[3]));
-  else if (what == "search" && argc > 2) search(std::atoi(argv[2]));
+  else if (what == "search" && argc > 2) search(std::atoi(argv[2]), argc > 3 && !std::strcmp(argv[3], "shuffled"));
   else if (what == "fmu" && argc > 3) bench::fmu(argv[2], argv[3]);
   else {
     std::fprintf(stderr, "usage: tiefmu_bench kernels CASE N [shuffled] [THREADS] | cycles CASE N COUNT | "
-                         "memory CASE N | search N | fmu FOLDER NOTHING\n");
+                         "memory CASE N | search N [shuffled] | fmu FOLDER NOTHING\n");
     return 2;
   }
 }

@@ -64,6 +64,7 @@ def growth(bench: Path) -> list[list[str]]:
     rows = []
     for n in (1_000, 10_000, 100_000, 1_000_000):
         rows += run(bench, "search", n)
+    rows += run(bench, "search", 1_000_000, "shuffled")
     for case in FORMULATIONS + CONSISTENT:
         for n in (10_000, 100_000):
             rows += run(bench, "memory", case, n)

@@ -13,13 +13,13 @@ inline double now() {
   return duration<double>(steady_clock::now().time_since_epoch()).count();
 }
 
-// Best of several runs of `body`, each of at least `enough` seconds, in seconds per call.
+// Best of `runs` runs of `body`, each of at least `enough` seconds, in seconds per call.
 template <class Body>
-double best(Body&& body, double enough = 0.05) {
+double best(Body&& body, double enough = 0.05, int runs = 7) {
   body();
   long calls = 1;
   double shortest = 1e30;
-  for (int run = 0; run < 7;) {
+  for (int run = 0; run < runs;) {
     const double start = now();
     for (long k = 0; k < calls; ++k) body();
     const double taken = now() - start;

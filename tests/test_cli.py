@@ -12,7 +12,7 @@ import pytest
 
 import tiefmu
 from conftest import toml
-from tiefmu import cli
+from tiefmu import cli, package
 from tiefmu.cli import main
 
 
@@ -172,9 +172,9 @@ def test_wrong_files(weld, scene_file, capsys, tmp_path, arguments, line):
         archive.writestr("modelDescription.xml", "<fmiModelDescription/>")
     with zipfile.ZipFile(tmp_path / "list.fmu", "w") as archive:
         archive.writestr("resources/report.json", "[]")
-    model = tiefmu.load(weld).model
+    xml = package.contents(tiefmu.load(weld))["modelDescription.xml"]
     with zipfile.ZipFile(tmp_path / "damaged.fmu", "w") as archive:
-        archive.writestr("modelDescription.xml", model.xml("weld", "", "{guid}"))
+        archive.writestr("modelDescription.xml", xml)
         archive.writestr("resources/report.json", '{"slaves": []}')
     (tmp_path / "damaged.fmu").write_bytes((tmp_path / "damaged.fmu").read_bytes().replace(b'{"slaves', b'{"salves'))
     before = sorted(tmp_path.rglob("*"))
