@@ -4,7 +4,8 @@
 # make study  measure speed, accuracy and stability, write charts and tables to docs/study/
 # make sanitize  100,000 random sequences of calls under sanitizers (make test: 2,000)
 # make fuzz   60 s of fuzzing of resources, serialised states and scene files
-# make bench  time the kernels and the FMU calls, write bench/latest.csv
+# make bench  time the kernels, the FMU calls and what grows with a scene, write bench/latest.csv and docs/bench.svg
+# Test and bench count instructions with valgrind: apt-get install valgrind
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
@@ -14,11 +15,11 @@ SOURCES := CMakeLists.txt $(wildcard src/*.?pp modelDescription/*.?pp fmu/*.?pp 
 # Each set in an environment of its own; not compiled ahead, as most of their files are never imported.
 TOOLS := build/tools/importers/installed build/tools/cofmupy/installed
 
-.PHONY: demo test tools study sanitize fuzz bench clean
+.PHONY: demo test tools study sanitize fuzz bench valgrind clean
 demo: $(VENV)/installed
 	$(BIN)/tiefmu demo --out out
 
-test: $(VENV)/installed tools
+test: $(VENV)/installed tools valgrind
 	$(BIN)/python -m pytest -n 2 --ignore tests/test_sanitizers.py --ignore tests/test_fuzz.py  # make sanitize, make fuzz
 
 study: $(VENV)/installed
@@ -44,7 +45,7 @@ fuzz: $(VENV)/installed
 	done
 	$(BIN)/python tests/fuzz/scenes.py --seconds $(FUZZ_SECONDS) --first $$(date +%s)
 
-bench: $(VENV)/installed
+bench: $(VENV)/installed valgrind
 	$(BIN)/python bench/run.py
 
 $(VENV)/built-with: pyproject.toml
@@ -58,6 +59,9 @@ $(VENV)/installed: $(VENV)/built-with $(SOURCES)
 	touch $@
 
 tools: $(TOOLS)
+
+valgrind:
+	@command -v valgrind >/dev/null || { echo "valgrind is missing: apt-get install valgrind"; exit 1; }
 
 build/tools/importers/installed: tests/tools/requirements.txt
 	$(PYTHON) -m venv --clear $(@D)

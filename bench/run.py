@@ -1,110 +1,215 @@
-"""Times the kernels and the FMU's calls, prints a table, writes bench/latest.csv.
+"""Times the kernels, the FMU's calls and the work round them; prints one table, writes bench/latest.csv and the chart.
 
-    make bench                 all of it
-    python bench/run.py --n 1e5
+    make bench                               all of it, in about ten minutes
+    python bench/run.py --n 1 1e3            cycles of these numbers of slaves only, without the rest and the chart
+    python bench/run.py --instructions       count instructions and make them the reference of tests/test_instructions.py
 """
 
 import argparse
 import csv
+import datetime
 import platform
+import shutil
 import subprocess
 import sys
 import tempfile
-import time
 import zipfile
 from pathlib import Path
 
-import tiefmu
-
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent
-COLUMNS = ["case", "n", "threads", "ns", "bytes", "triad_gb_s"]
+LATEST, REFERENCE, CHART = HERE / "latest.csv", HERE / "instructions.csv", ROOT / "docs" / "bench.svg"
+COLUMNS = ["case", "n", "threads", "value", "unit", "bytes", "triad_gb_s"]
+FORMULATIONS = ["default", "default-rotations", "optimized"]
+CONSISTENT = [f"{name}-consistent" for name in FORMULATIONS]
+SLAVES = [1, 4, 16, 100, 1_000, 10_000, 100_000, 1_000_000]
+THREADS = [1, 2]
+COUNTED = 1024  # slaves of the instruction counts: in the caches, and the rest of the program small beside them
+GROWTH = [1_000, 10_000, 100_000]  # slaves of the scenes that are loaded and built
 
+
+# ---------------------------------------------------------------------------------------------------------- measuring
 
 def program() -> Path:
-    """The benchmark program, built with the release preset."""
+    """The benchmark program, built with the release preset; `nothing.so` lies beside it."""
     cmake = Path(sys.executable).with_name("cmake")
-    quiet = {"cwd": ROOT, "check": True, "stdout": subprocess.DEVNULL}
-    subprocess.run([cmake, "--preset", "release", f"-DPython_EXECUTABLE={sys.executable}", "-DTIEFMU_PYTHON=OFF"], **quiet)
-    subprocess.run([cmake, "--build", "--preset", "release", "--target", "tiefmu_bench"], **quiet)
+    path = {"cwd": ROOT, "check": True, "stdout": subprocess.DEVNULL}
+    subprocess.run([cmake, "--preset", "release", f"-DPython_EXECUTABLE={sys.executable}", "-DTIEFMU_PYTHON=OFF",
+                    f"-DCMAKE_MAKE_PROGRAM={cmake.with_name('ninja')}"], **path)
+    subprocess.run([cmake, "--build", "--preset", "release", "--target", "tiefmu_bench", "tiefmu_nothing"], **path)
     return ROOT / "build" / "release" / "tiefmu_bench"
 
 
 def run(*arguments) -> list[list[str]]:
-    output = subprocess.run([str(a) for a in arguments], check=True, capture_output=True, text=True).stdout
+    """Rows of a program that prints CSV."""
+    print(*(Path(str(a)).name for a in arguments), file=sys.stderr, flush=True)
+    output = subprocess.run([str(a) for a in arguments], check=True, stdout=subprocess.PIPE, text=True).stdout
     return list(csv.reader(output.splitlines()))
 
 
-def surface(slaves: int) -> dict:
-    """A scene of driven masters with four slaves on each quad, without offset."""
-    side = max(1, round((slaves / 4) ** 0.5))
-    nodes = [[j * (side + 1) + i + 1, i, j, 0] for j in range(side + 1) for i in range(side + 1)]
-    segments, first = [], len(nodes) + 1
-    for j in range(side):
-        for i in range(side):
-            a = j * (side + 1) + i + 1
-            segments.append([len(segments) + 1, a, a + 1, a + side + 2, a + side + 1])
-            for k in range(4):
-                nodes.append([len(nodes) + 1, i + 0.3 + 0.4 * (k % 2), j + 0.3 + 0.4 * (k // 2), 0])
-    slave_ids = [node[0] for node in nodes if node[0] >= first]
-    return {
-        "title": f"{len(slave_ids)} slaves",
-        "mesh": {"nodes": nodes, "segments": segments},
-        "tie": [{"name": "surface", "segments": "all", "slaves": slave_ids}],
-    }
+def cycles(bench: Path, slaves: list[int]) -> list[list[str]]:
+    rows = []
+    for n in slaves:
+        for case in FORMULATIONS + CONSISTENT:
+            for threads in THREADS if n >= 100 else [1]:
+                rows += run(bench, "kernels", case, n, threads)
+        if n >= 10_000:
+            for case in FORMULATIONS:
+                rows += run(bench, "kernels", case, n, "shuffled", 1)
+    return rows
 
 
-ONE_SLAVE = {
-    "title": "One slave",
-    "mesh": {"nodes": [[1, 0, 0, 0], [2, 1, 0, 0], [3, 1, 1, 0], [4, 0, 1, 0], [5, 0.3, 0.6, 0.4]],
-             "segments": [[1, 1, 2, 3, 4]]},
-    "node": [{"nodes": [1, 2, 3, 4], "rotations": True}, {"nodes": [5], "mass": 0.7}],
-    "tie": [{"name": "weld", "segments": "all", "slaves": [5]}],
-}
+def growth(bench: Path) -> list[list[str]]:
+    """Search, memory, and what it takes to load a scene file and to build its FMU."""
+    rows = []
+    for n in (1_000, 10_000, 100_000, 1_000_000):
+        rows += run(bench, "search", n)
+    rows += run(bench, "search", 1_000_000, "shuffled")
+    for case in FORMULATIONS + CONSISTENT:
+        for n in (10_000, 100_000):
+            rows += run(bench, "memory", case, n)
+    for n in GROWTH:
+        rows += run(sys.executable, HERE / "growth.py", n)
+    return rows
 
 
-def build_and_unpack(scene: dict, folder: Path, name: str) -> Path:
-    fmu = tiefmu.build(tiefmu.load(scene), folder / f"{name}.fmu")
-    target = folder / name
-    with zipfile.ZipFile(fmu) as archive:
-        archive.extractall(target)
-    return target
+def calls(bench: Path) -> list[list[str]]:
+    import tiefmu
+    from growth import ONE_SLAVE, surface
+    rows, nothing = [], bench.with_name("nothing.so")
+    with tempfile.TemporaryDirectory() as folder:
+        for name, scene in (("one", ONE_SLAVE), ("many", surface(10_000)), ("free", surface(100_000, motion="free"))):
+            fmu = tiefmu.build(tiefmu.load(scene), Path(folder) / f"{name}.fmu")
+            with zipfile.ZipFile(fmu) as archive:
+                archive.extractall(Path(folder) / name)
+            rows += [[f"{name}-{row[0]}", *row[1:]] for row in run(bench, "fmu", Path(folder) / name, nothing)]
+    return rows
+
+
+# ------------------------------------------------------------------------------------------------------- instructions
+
+def instructions(bench: Path) -> dict[str, float]:
+    """Instructions per slave and cycle: the difference of two runs, so that nothing but cycles is counted."""
+    valgrind = shutil.which("valgrind")
+    if not valgrind:
+        raise SystemExit("valgrind is missing; it counts instructions: apt-get install valgrind")
+    few, many = 4, 24
+
+    def total(case: str, count: int) -> int:
+        done = subprocess.run([valgrind, "--tool=callgrind", "--callgrind-out-file=/dev/null", bench, "cycles", case,
+                               str(COUNTED), str(count)], check=True, capture_output=True, text=True)
+        line = next(line for line in done.stderr.splitlines() if "Collected" in line)
+        return int(line.split()[-1])
+    return {case: (total(case, many) - total(case, few)) / (many - few) / COUNTED for case in FORMULATIONS + CONSISTENT}
+
+
+def write_reference(counts: dict[str, float]) -> None:
+    with REFERENCE.open("w", newline="") as file:
+        file.write(f"# instructions per slave and cycle at {COUNTED} slaves; {compiler()}; {simd()}\n")
+        csv.writer(file, lineterminator="\n").writerows(
+            [["case", "instructions"], *([case, f"{count:.1f}"] for case, count in counts.items())])
+
+
+def reference() -> tuple[dict[str, float], str]:
+    """The committed counts, and what they were made with: compiler and instruction set."""
+    with REFERENCE.open(newline="") as file:
+        made_with = file.readline().split("; ", 1)[1].strip()
+        return {row["case"]: float(row["instructions"]) for row in csv.DictReader(file)}, made_with
+
+
+# ------------------------------------------------------------------------------------------------------------- machine
+
+def compiler() -> str:
+    return subprocess.run(["c++", "--version"], capture_output=True, text=True).stdout.splitlines()[0]
+
+
+def simd() -> str:
+    """The widest vectors that valgrind lets a program see."""
+    flags = cpuinfo("flags").split()
+    return "AVX2" if "avx2" in flags and "fma" in flags else "SSE2"
+
+
+def cpuinfo(key: str) -> str:
+    try:
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+    except OSError:
+        return ""
+    return next((line.split(":", 1)[1].strip() for line in lines if line.startswith(key)), "")
+
+
+def made_with() -> list[str]:
+    commit = subprocess.run(["git", "describe", "--always", "--dirty"], cwd=ROOT, capture_output=True, text=True).stdout
+    return [f"{cpuinfo('model name') or platform.processor()}, {cpuinfo('siblings') or '?'} threads",
+            compiler(), f"{datetime.date.today()}, commit {commit.strip() or 'unknown'}"]
+
+
+# -------------------------------------------------------------------------------------------------------------- output
+
+def table(rows: list[list[str]]) -> str:
+    lines = [f"{'case':32}{'n':>9}{'threads':>9}{'value':>12}  {'unit':26}{'bytes':>6}{'times bytes/triad':>19}"]
+    for case, n, threads, value, unit, moved, triad in rows:
+        line = f"{case:32}{n:>9}{threads:>9}{float(value):>12,.4g}  {unit:26}"
+        if float(moved) and float(triad):
+            line += f"{moved:>6}{float(value) / (float(moved) / float(triad)):>19.2f}"
+        lines.append(line.rstrip())
+    return "\n".join(lines)
+
+
+def chart(rows: list[list[str]], made: list[str]) -> None:
+    """ns per slave and cycle against the number of slaves; dotted: what a triad needs for the bytes that must move."""
+    import matplotlib
+    matplotlib.use("svg")
+    matplotlib.rcParams["svg.hashsalt"] = "bench"
+    import matplotlib.pyplot as plt
+    colours = dict(zip(FORMULATIONS, ["#0072B2", "#009E73", "#D55E00"]))
+    figure, axes = plt.subplots(1, 2, figsize=(11, 5), layout="constrained", sharex=True, sharey=True)
+    for axis, cases, title in ((axes[0], FORMULATIONS, "lumped inertia"), (axes[1], CONSISTENT, "consistent inertia")):
+        for case in cases:
+            colour = colours[case.removesuffix("-consistent")]
+            for threads, style in ((1, "-o"), (2, "--s")):
+                own = [row for row in rows if row[0] == case and row[2] == str(threads)]
+                axis.plot([int(row[1]) for row in own], [float(row[3]) for row in own], style, color=colour, markersize=4,
+                          label=f"{case.removesuffix('-consistent')}, {threads} thread" + "s" * (threads > 1))
+            large = [row for row in rows if row[0] == case and float(row[5]) and int(row[1]) >= 100_000]
+            if large:
+                axis.plot([int(row[1]) for row in large], [float(row[5]) / float(row[6]) for row in large], ":",
+                          color=colour, linewidth=2)
+        shuffled = [row for row in rows if row[0] in [f"{case}-shuffled" for case in cases]]
+        for row in shuffled:
+            axis.plot(int(row[1]), float(row[3]), "x", color=colours[row[0].removesuffix("-shuffled")], markersize=7)
+        axis.set(xscale="log", yscale="log", xlabel="slaves", title=title)
+        axis.grid(alpha=0.25)
+    axes[0].set_ylabel("ns per slave and cycle")
+    axes[0].plot([], [], ":", color="#444", linewidth=2, label="bytes that must move / triad")
+    axes[0].plot([], [], "x", color="#444", label="slaves shuffled")
+    axes[0].legend(frameon=False, fontsize=8)
+    figure.supxlabel("; ".join(made), fontsize=7, color="#555")
+    figure.savefig(CHART, metadata={"Date": None})
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--n", type=float, nargs="*", default=[1e2, 1e3, 1e4, 1e5, 1e6], help="numbers of slaves")
-    parser.add_argument("--output", type=Path, default=HERE / "latest.csv")
+    parser.add_argument("--n", type=float, nargs="+", help="numbers of slaves")
+    parser.add_argument("--instructions", action="store_true", help="only count instructions, and write the reference")
     options = parser.parse_args()
-    bench = program()
-    rows = []
-    for n in options.n:
-        rows += run(bench, "kernels", int(n))
-    for coupling in ("default", "default-rotations", "optimized"):
-        rows += run(bench, "memory", coupling, 100_000)
-    with tempfile.TemporaryDirectory() as folder:
-        one = build_and_unpack(ONE_SLAVE, Path(folder), "one")
-        many = build_and_unpack(surface(10_000), Path(folder), "many")
-        rows += run(bench, "fmu", one) + run(bench, "fmu", many)
-        start = time.perf_counter()
-        tiefmu.build(tiefmu.load(surface(10_000)), Path(folder) / "timed.fmu")
-        rows.append(["build-1e4", "10000", "1", f"{(time.perf_counter() - start) * 1e9:.0f}", "0", "0"])
-        start = time.perf_counter()
-        tiefmu.build(tiefmu.load(ROOT / "scenes" / "spotweld.toml"), Path(folder) / "spotweld.fmu")
-        rows.append(["build-spotweld", "2", "1", f"{(time.perf_counter() - start) * 1e9:.0f}", "0", "0"])
-    with options.output.open("w", newline="") as file:
+    bench, made = program(), made_with()
+    if options.instructions:
+        counts = instructions(bench)
+        write_reference(counts)
+        print("\n".join(f"{case:32}{count:10.1f} instructions per slave and cycle" for case, count in counts.items()))
+        return
+    if options.n:
+        print(table(cycles(bench, [int(n) for n in options.n])))
+        return
+    rows = cycles(bench, SLAVES) + growth(bench) + calls(bench)
+    rows += [[f"instructions-{case}", COUNTED, 1, f"{count:.1f}", "per slave and cycle", 0, 0]
+             for case, count in instructions(bench).items()]
+    with LATEST.open("w", newline="") as file:
+        file.writelines(f"# {line}\n" for line in made)
         csv.writer(file, lineterminator="\n").writerows([COLUMNS, *rows])
-
-    print(f"{platform.machine()}, {compiler()}; ns per slave and cycle, per call, per value or per build")
-    print(f"{'case':24}{'n':>10}{'threads':>9}{'ns':>16}{'bytes':>8}{'x bytes/triad':>15}")
-    for case, n, threads, ns, moved, triad in rows:
-        multiple = float(ns) / (float(moved) / float(triad)) if float(triad) else None
-        print(f"{case:24}{n:>10}{threads:>9}{float(ns):>16,.2f}{moved:>8}" + (f"{multiple:>15.2f}" if multiple else ""))
-    print(f"written to {options.output}")
-
-
-def compiler() -> str:
-    return subprocess.run(["c++", "--version"], capture_output=True, text=True).stdout.splitlines()[0]
+    chart(rows, made)
+    print("\n".join(made) + "\n" + table(rows))
+    print(f"written to {LATEST} and {CHART}")
 
 
 if __name__ == "__main__":

@@ -180,15 +180,28 @@ void Instance::exitInitializationMode() {
 void Instance::findHostStep() {
   const Model& model = simulation.model();
   hostStep = std::numeric_limits<double>::infinity();
-  const auto consider = [&](double own, double added, double stiffness, int node) {
+  const auto consider = [&](double own, double added, double stiffness, int node, int port = -1) {
     if (!(own > 0) || !(stiffness > 0)) return;
     const double step = std::sqrt(2 * (own + added) / stiffness);
     if (step >= hostStep) return;
     hostStep = step;
     hostNode = node;
+    hostPort = port;
   };
+  std::vector<std::uint8_t> inPort(static_cast<std::size_t>(model.nodes()));
+  for (std::size_t p = 0; p < model.drivenPorts(); ++p) {
+    double own = 0, added = 0, stiffness = 0;
+    for (int i : model.ports[p].member) {
+      inPort[static_cast<std::size_t>(i)] = 1;
+      own += model.nodeMass[i];
+      added += simulation.field(Field::addedMass)[i];
+      stiffness += simulation.field(Field::stiffness)[i];
+    }
+    consider(own, added, stiffness, 0, static_cast<int>(p));
+  }
   for (int group : {rotatingDrivenMaster, drivenMaster})
     for (int i = model.begin[group]; i < model.begin[group + 1]; ++i) {
+      if (inPort[static_cast<std::size_t>(i)]) continue;
       consider(model.nodeMass[i], simulation.field(Field::addedMass)[i], simulation.field(Field::stiffness)[i], i);
       if (i < model.rotating())
         consider(model.nodeInertia[i], simulation.field(Field::addedInertia)[i],
@@ -199,10 +212,11 @@ void Instance::findHostStep() {
 void Instance::warnOfStep(double step) {
   if (warnedOfStep || !logger.wants(Category::stability)) return;
   warnedOfStep = true;
+  const Model& model = simulation.model();
+  const std::string whose = hostPort >= 0 ? "port '" + model.ports[static_cast<std::size_t>(hostPort)].name + "'"
+                                          : "driven master node " + std::to_string(model.nodeId[hostNode]);
   const std::string message = "the communication step " + text(step) + " s is longer than the nodal time step " +
-                              text(hostStep) + " s of driven master node " +
-                              std::to_string(simulation.model().nodeId[hostNode]) +
-                              ": an explicit host is unstable with it";
+                              text(hostStep) + " s of " + whose + ": an explicit host is unstable with it";
   logger.write(fmi2Warning, Category::stability, message.c_str());
 }
 

@@ -135,7 +135,7 @@ class Instance {
   std::vector<double> scratch;  // laid out like the simulation's array
   Clock clock;
   double hostStep = std::numeric_limits<double>::infinity();  // the least that a driven master's stiffness allows, s
-  int hostNode = 0;
+  int hostNode = 0, hostPort = -1;  // whose it is: a port's, else the node's
   bool warnedOfStep = false;
   std::unordered_map<fmi2FMUstate, std::unique_ptr<SavedState>> savedStates;
 };

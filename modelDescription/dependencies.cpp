@@ -11,6 +11,9 @@ namespace {
 // Beyond these an unknown is taken to depend on everything: lists of that length help no importer.
 constexpr std::size_t mostEntriesPerRow = 5000;
 constexpr std::size_t mostEntriesPerClass = 1000000;  // unknowns of a class times their knowns
+// So is one that depends on nearly everything: an absent list says so (FMI 2.0.4, 2.2.8).
+constexpr std::size_t longRow = 1000;
+constexpr double nearlyAll = 0.9;
 
 Dependence kindOf(Pattern p, int bit) {
   return p.moving >> bit & 1     ? Dependence::dependent
@@ -37,12 +40,14 @@ class Analysis {
   void rows(const Block& block);
   void nodeRows(const Block& block);
   void slaveRows(const Block& block);
+  void portRows(const Block& block);
 
   const Model& model;
   const std::vector<Block>& blocks;
   const Layout layout;
   const Influences influences;
   const std::uint32_t references;
+  std::size_t inputs = 0;
 
   // Accelerations that a mass matrix couples form a class: they depend on the same knowns.
   std::vector<std::uint32_t> parent;  // union-find over 6 freedoms of each free node
@@ -165,7 +170,8 @@ void Analysis::collect(const List& list, int component, Dependence least, bool a
 }
 
 void Analysis::finishRow() {
-  const bool all = rowIsAll || row.size() > mostEntriesPerRow;
+  const bool dense = row.size() > longRow && static_cast<double>(row.size()) > nearlyAll * static_cast<double>(inputs);
+  const bool all = rowIsAll || dense || row.size() > mostEntriesPerRow;
   if (!all) out.entries.insert(out.entries.end(), row.begin(), row.end());
   out.all.push_back(all);
   out.begin.push_back(out.entries.size());
@@ -196,9 +202,10 @@ void Analysis::nodeRows(const Block& block) {
 
 void Analysis::slaveRows(const Block& block) {
   List v, w, x, a;
-  const std::size_t last = out.all.size() + block.count();
+  const int first = static_cast<int>((block.place - layout[block.field].offset) / block.components);
+  const int last = first + static_cast<int>(block.numbers.size());
   influences.eachSegment([&](const Segment& s) {
-    for (int slave = s.first; slave < s.last && out.all.size() < last; ++slave) {
+    for (int slave = std::max(s.first, first); slave < std::min(s.last, last); ++slave) {
       for (List* list : {&v, &w, &x, &a}) list->clear();
       if (block.field == Field::slaveAcceleration)
         influences.acceleration(s, slave, a);
@@ -217,8 +224,25 @@ void Analysis::slaveRows(const Block& block) {
   });
 }
 
+void Analysis::portRows(const Block& block) {
+  const bool inertial = model.settings.reaction != Reaction::loads;
+  const bool driven = block.field == Field::portReaction || block.field == Field::portReactionMoment;
+  const bool known = block.field != Field::portPosition;  // which is a state
+  for (std::size_t e = 0; e < block.numbers.size(); ++e) {
+    Influences::Resultant sum;
+    if (known) sum = driven ? influences.resultant(e, inertial) : influences.means[e];
+    const bool first = block.field == Field::portReaction || block.field == Field::portMeanVelocity;
+    for (int k = 0; k < block.components; ++k) {
+      startRow();
+      collect(first ? sum.force : sum.moment, k, Dependence::constant, true);
+      finishRow();
+    }
+  }
+}
+
 void Analysis::rows(const Block& block) {
   const bool unknown = block.causality == Causality::output || block.causality == Causality::calculatedParameter;
+  if (unknown && block.prefix == "port") return portRows(block);
   if (unknown && block.prefix == "slave") return slaveRows(block);
   if (unknown && !block.prefix.empty()) return nodeRows(block);
   for (std::size_t i = 0; i < block.count(); ++i) {
@@ -232,6 +256,8 @@ Dependencies Analysis::run() {
   stampOf.assign(references, 0);
   placeOf.resize(references);
   out.begin.push_back(0);
+  for (const Block& b : blocks)
+    if (b.causality == Causality::input) inputs += b.count();
   findClasses();
   for (const Block& b : blocks) rows(b);
   return std::move(out);

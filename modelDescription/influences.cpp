@@ -1,5 +1,8 @@
 #include "influences.hpp"
 
+#include <algorithm>
+
+#include "port.hpp"
 #include "segment.hpp"
 
 namespace tiefmu {
@@ -7,10 +10,10 @@ namespace tiefmu {
 Influences::Influences(const Model& m, const Layout& l, const std::vector<Block>& blocks)
     : nodeForce(m.nodes()),
       nodeMoment(m.nodes()),
-      reactionForce(m.nodes()),
-      reactionMoment(m.nodes()),
-      inertialForce(m.nodes()),
-      inertialMoment(m.nodes()),
+      reactionForce(m.nodes() + m.drivenPorts()),
+      reactionMoment(m.nodes() + m.drivenPorts()),
+      inertialForce(m.nodes() + m.drivenPorts()),
+      inertialMoment(m.nodes() + m.drivenPorts()),
       addedMass(m.nodes()),
       addedInertia(m.nodes()),
       model(m),
@@ -23,15 +26,97 @@ Influences::Influences(const Model& m, const Layout& l, const std::vector<Block>
       referenceAt[b.place + i] = b.reference + static_cast<std::uint32_t>(i);
     shapesChange |= b.field == Field::position && model.finite();
   }
+  findMembers();
   findSprings();
   findReactions();
   findAdditions();
   findInertialLoads();
+  findMeans();
+}
+
+void Influences::findMembers() {
+  for (std::size_t p = 0; p < model.ports.size(); ++p) {
+    std::vector<Membership>& list = model.ports[p].ofSlaves ? slavePort : nodePort;
+    if (list.empty()) list.resize(static_cast<std::size_t>(model.ports[p].ofSlaves ? model.slaves() : model.nodes()));
+    for (std::size_t i = 0; i < model.ports[p].member.size(); ++i)
+      list[static_cast<std::size_t>(model.ports[p].member[i])] = {p, i};
+  }
+  if (slavePort.empty()) return;
+  std::vector<int> body(static_cast<std::size_t>(model.slaves()), -1);  // that alone moves the slave
+  eachSegment([&](const Segment& s) {
+    for (int slave = s.first; slave < s.last; ++slave)
+      if (s.bodies == 1) body[static_cast<std::size_t>(slave)] = s.body[0];
+  });
+  for (std::size_t p = model.drivenPorts(); p < model.ports.size(); ++p) {
+    const Port& port = model.ports[p];
+    const auto turning = port.turnWeight > 0 ? std::count_if(port.member.begin(), port.member.end(),
+                                                             [&](int slave) { return slave < model.turning(); })
+                                             : 0;
+    const Mat3 inertia = armInertia(port.arm) + static_cast<double>(turning) * port.turnWeight * Mat3::Identity();
+    const int first = body[static_cast<std::size_t>(port.member[0])];
+    const bool same = std::all_of(port.member.begin(), port.member.end(),
+                                  [&](int slave) { return body[static_cast<std::size_t>(slave)] == first; });
+    const bool rigid = std::all_of(port.member.begin(), port.member.end(),
+                                   [&](int slave) { return slave < model.turning() || !hasOffset(slave); });
+    slavePorts.push_back({same ? first : -1, rigid, inertia.inverse()});
+  }
+}
+
+// Of w in w x arm, or of f in arm x f.
+Pattern Influences::turning(const Vec3& arm) const {
+  if (arm.isZero(0)) return {};
+  return model.finite() ? moving(crossPattern) : patternOf(skew(arm));
+}
+
+Pattern Influences::armOf(int node) const {
+  const auto [port, index] = nodePort[static_cast<std::size_t>(node)];
+  return turning(at(model.ports[port].arm.data(), static_cast<Eigen::Index>(index)));
+}
+
+void Influences::addVelocity(List& to, Pattern left, int body) const {
+  const std::size_t port = portOf(body);
+  if (port == none) return add(to, left, known(Field::velocity, body));
+  add(to, left, known(Field::portVelocity, static_cast<int>(port)));
+  if (body < model.nodes()) add(to, left * armOf(body), known(Field::portSpin, static_cast<int>(port)));
+}
+
+void Influences::addSpin(List& to, Pattern left, int body) const {
+  const std::size_t port = portOf(body);
+  if (port == none) return add(to, left, known(Field::spin, body));
+  if (body < model.rotating() || body >= model.nodes())
+    add(to, left, known(Field::portSpin, static_cast<int>(port)));
+}
+
+void Influences::addAcceleration(List& to, Pattern left, int body) const {
+  if (isFree(body)) return add(to, left, references_ + 6 * static_cast<std::uint32_t>(body - model.freeBegin()));
+  const std::size_t port = portOf(body);
+  if (port == none) return add(to, left, known(Field::acceleration, body));
+  if (!model.accelerationInputs()) return;
+  add(to, left, known(Field::portAcceleration, static_cast<int>(port)));
+  if (body >= model.nodes()) return;
+  add(to, left * armOf(body), known(Field::portAngularAcceleration, static_cast<int>(port)));
+  if (model.finite() && !armOf(body).empty())
+    add(to, left * moving(fullPattern), known(Field::portSpin, static_cast<int>(port)));
+}
+
+void Influences::addAngularAcceleration(List& to, Pattern left, int body) const {
+  if (body >= model.rotating() && body < model.nodes()) return;
+  if (isFree(body)) return add(to, left, references_ + 6 * static_cast<std::uint32_t>(body - model.freeBegin()) + 3);
+  const std::size_t port = portOf(body);
+  add(to, left, port == none ? known(Field::angularAcceleration, body)
+                             : known(Field::portAngularAcceleration, static_cast<int>(port)));
 }
 
 Segment Influences::segment(const TieGroup& g, int e) const {
   Segment s{g, &g.node[static_cast<std::size_t>(g.corners) * e], g.firstSlave + g.begin[e],
-            g.firstSlave + g.begin[e + 1], Mat3::Zero(), {}};
+            g.firstSlave + g.begin[e + 1], g.corners, {}, Mat3::Zero(), {}};
+  std::copy_n(s.node, g.corners, s.body);
+  const std::size_t port = portOf(s.node[0]);
+  if (port != none && std::all_of(s.node, s.node + g.corners, [&](int node) { return portOf(node) == port; })) {
+    s.bodies = 1;
+    s.body[0] = model.nodes() + static_cast<int>(port);
+    return s;
+  }
   if (g.coupling != Coupling::meanMotion || model.finite()) return s;
   Vec3 centre = Vec3::Zero();
   for (int i = 0; i < g.corners; ++i) centre += at(model.nodePosition.data(), s.node[i]) / g.corners;
@@ -46,6 +131,16 @@ Segment Influences::segment(const TieGroup& g, int e) const {
 
 void Influences::corners(const Segment& s, int slave, CornerMap maps[4]) const {
   const Vec3 d = at(model.slaveOffset.data(), slave);
+  if (s.body[0] >= model.nodes()) {  // v + w x r
+    Vec3 r = -model.ports[portOf(s.body[0])].place;
+    const bool mean = s.group.coupling == Coupling::meanMotion;
+    for (int i = 0; i < s.group.corners; ++i)
+      r += (mean ? 1.0 / s.group.corners : weight(s, slave, i)) * at(model.nodePosition.data(), s.node[i]);
+    const bool turns = s.group.coupling != Coupling::translation;
+    if (turns) r += d;
+    maps[0] = {identityPattern, turning(r), {}, turns ? identityPattern : Pattern{}};
+    return;
+  }
   for (int i = 0; i < s.group.corners; ++i) {
     CornerMap map;
     if (s.group.coupling == Coupling::meanMotion) {
@@ -72,13 +167,14 @@ void Influences::motion(const Segment& s, int slave, List& v, List& w, List& x) 
   CornerMap maps[4];
   corners(s, slave, maps);
   const bool mean = s.group.coupling == Coupling::meanMotion;
-  for (int i = 0; i < s.group.corners; ++i) {
-    const int node = s.node[i];
-    add(v, maps[i].vv, known(Field::velocity, node));
-    add(v, maps[i].vw, known(Field::spin, node));
-    add(w, maps[i].wv, known(Field::velocity, node));
-    add(w, maps[i].ww, known(Field::spin, node));
-    const std::uint32_t position = known(Field::position, node);
+  for (int i = 0; i < s.bodies; ++i) {
+    const int body = s.body[i];
+    addVelocity(v, maps[i].vv, body);
+    addSpin(v, maps[i].vw, body);
+    addVelocity(w, maps[i].wv, body);
+    addSpin(w, maps[i].ww, body);
+    if (body >= model.nodes()) return;  // its place is a state
+    const std::uint32_t position = known(Field::position, body);
     add(x, mean && model.finite() ? identityPattern : maps[i].vv, position);
     if (mean && shapesChange) {
       if (hasOffset(slave)) add(v, moving(fullPattern), position);
@@ -91,6 +187,11 @@ void Influences::motion(const Segment& s, int slave, List& v, List& w, List& x) 
 Influences::Bias Influences::bias(const Segment& s, int slave, int corner) const {
   Bias b;
   if (!model.finite()) return b;
+  if (s.body[0] >= model.nodes()) {
+    if (model.accelerationInputs() || (s.group.coupling != Coupling::translation && hasOffset(slave)))
+      b.onW = moving(fullPattern);
+    return b;
+  }
   if (s.group.coupling == Coupling::meanMotion) {
     if (hasOffset(slave)) b.onV = moving(fullPattern);
     b.onZ = moving(fullPattern);
@@ -104,15 +205,15 @@ Influences::Bias Influences::bias(const Segment& s, int slave, int corner) const
 void Influences::acceleration(const Segment& s, int slave, List& a) const {
   CornerMap maps[4];
   corners(s, slave, maps);
-  for (int i = 0; i < s.group.corners; ++i) {
-    const int node = s.node[i];
-    add(a, maps[i].vv, acceleration(node));
-    add(a, maps[i].vw, angularAcceleration(node));
+  for (int i = 0; i < s.bodies; ++i) {
+    const int body = s.body[i];
+    addAcceleration(a, maps[i].vv, body);
+    addAngularAcceleration(a, maps[i].vw, body);
     const Bias b = bias(s, slave, i);
-    add(a, b.onV, known(Field::velocity, node));
-    add(a, b.onW, known(Field::spin, node));
+    addVelocity(a, b.onV, body);
+    addSpin(a, b.onW, body);
     if (s.group.coupling == Coupling::meanMotion && shapesChange && hasOffset(slave))
-      add(a, moving(fullPattern), known(Field::position, node));
+      add(a, moving(fullPattern), known(Field::position, body));
   }
 }
 
@@ -151,8 +252,8 @@ void Influences::addSpring(const Spring& spring, const std::vector<List>& v, con
       const int k = sprung[end->slave];
       ev = v[k], ew = w[k], ex = x[k];
     } else if (end->node >= 0) {
-      add(ev, identityPattern, known(Field::velocity, end->node));
-      add(ew, identityPattern, known(Field::spin, end->node));
+      addVelocity(ev, identityPattern, end->node);
+      addSpin(ew, identityPattern, end->node);
       add(ex, identityPattern, known(Field::position, end->node));
     }
     List force;  // on either end
@@ -197,17 +298,18 @@ void Influences::findReactions() {
       add(force, weightOf, known(Field::slaveMass, slave, 1));
       add(force, identityPattern, known(Field::slaveForce, slave));
       add(moment, identityPattern, known(Field::slaveMoment, slave));
+      addPortLoads(slave, force, moment);
       if (const int k = sprung[slave]; k >= 0) {
         add(force, identityPattern, slaveForce[k]);
         add(moment, identityPattern, slaveMoment[k]);
       }
       corners(s, slave, maps);
-      for (int i = 0; i < s.group.corners; ++i) {
+      for (int i = 0; i < s.bodies; ++i) {
         const CornerMap& map = maps[i];
-        add(reactionForce[s.node[i]], transposed(map.vv), force);
-        add(reactionForce[s.node[i]], transposed(map.wv), moment);
-        add(reactionMoment[s.node[i]], transposed(map.vw), force);
-        add(reactionMoment[s.node[i]], transposed(map.ww), moment);
+        add(reactionForce[s.body[i]], transposed(map.vv), force);
+        add(reactionForce[s.body[i]], transposed(map.wv), moment);
+        add(reactionMoment[s.body[i]], transposed(map.vw), force);
+        add(reactionMoment[s.body[i]], transposed(map.ww), moment);
       }
     }
     if (s.group.coupling == Coupling::meanMotion && shapesChange)
@@ -215,6 +317,116 @@ void Influences::findReactions() {
         for (int j = 0; j < s.group.corners; ++j)
           add(reactionForce[s.node[i]], moving(fullPattern), known(Field::position, s.node[j]));
   });
+  // Loads of ports of slaves that one port of driven nodes moves arrive there whole.
+  for (std::size_t q = model.drivenPorts(); q < model.ports.size(); ++q) {
+    const int k = static_cast<int>(q - model.drivenPorts()), body = slavePorts[static_cast<std::size_t>(k)].body;
+    if (body < 0) continue;
+    const std::array<Pattern, 3> motion = asOne(q);
+    add(reactionForce[body], transposed(motion[0]), known(Field::portForce, k));
+    add(reactionMoment[body], transposed(motion[1]), known(Field::portForce, k));
+    add(reactionMoment[body], transposed(motion[2]), known(Field::portMoment, k));
+  }
+}
+
+// The motion of a port of slaves that one port of driven nodes moves: its velocity by that one's velocity and by its
+// spin, and its spin by its spin. Slaves without rotations follow points beside them, and so not as a body.
+std::array<Pattern, 3> Influences::asOne(std::size_t number) const {
+  const Port& port = model.ports[number];
+  const SlavePort& slaves = slavePorts[number - model.drivenPorts()];
+  if (!slaves.rigid) {
+    const auto now = [&](Pattern p) { return model.finite() ? moving(p) : changing(p); };
+    return {identityPattern, now(port.lever.isZero(0) ? crossPattern : fullPattern), now(fullPattern)};
+  }
+  return {identityPattern, turning(port.place - model.ports[portOf(slaves.body)].place), identityPattern};
+}
+
+CornerMap Influences::portMap(std::size_t number, std::size_t index) const {
+  const Port& port = model.ports[number];
+  const int slave = port.member[index];
+  const bool alone = port.member.size() == 1, lever = !port.lever.isZero(0);
+  const bool turns = port.turnWeight > 0 && slave < model.turning();
+  CornerMap map;
+  map.vv = identityPattern;
+  if (alone) {
+    map.ww = identityPattern;
+    if (lever) map.vw = model.finite() ? moving(crossPattern) : patternOf(skew(port.lever));
+    return map;
+  }
+  if (model.finite()) {
+    if (lever) map.vv = moving(fullPattern);
+    map.wv = moving(fullPattern);
+    if (turns) map.ww = moving(fullPattern);
+    if (turns && lever) map.vw = moving(fullPattern);
+    return map;
+  }
+  const Mat3& inverse = slavePorts[number - model.drivenPorts()].inverse;
+  const Mat3 turn = inverse * skew(at(port.arm.data(), static_cast<Eigen::Index>(index)));
+  map.vv = patternOf(Mat3::Identity() / static_cast<double>(port.member.size()) - skew(port.lever) * turn);
+  map.wv = patternOf(turn);
+  if (turns) map.ww = patternOf(inverse);
+  if (turns && lever) map.vw = patternOf(skew(port.lever) * inverse);
+  return map;
+}
+
+// What a port puts on one of its slaves.
+void Influences::addPortLoads(int slave, List& force, List& moment) const {
+  if (slavePort.empty() || slavePort[static_cast<std::size_t>(slave)].port == none) return;
+  const auto [port, index] = slavePort[static_cast<std::size_t>(slave)];
+  if (slavePorts[port - model.drivenPorts()].body >= 0) return;
+  const CornerMap map = portMap(port, index);
+  const int k = static_cast<int>(port - model.drivenPorts());
+  add(force, transposed(map.vv), known(Field::portForce, k));
+  add(force, transposed(map.wv), known(Field::portMoment, k));
+  add(moment, transposed(map.vw), known(Field::portForce, k));
+  add(moment, transposed(map.ww), known(Field::portMoment, k));
+}
+
+void Influences::findMeans() {
+  const std::size_t first = model.drivenPorts();
+  means.resize(model.ports.size() - first);
+  if (means.empty()) return;
+  for (std::size_t k = 0; k < means.size(); ++k) {
+    const int body = slavePorts[k].body;
+    if (body < 0) continue;
+    const auto [velocity, turn, spin] = asOne(first + k);
+    addVelocity(means[k].force, velocity, body);
+    addSpin(means[k].force, turn, body);
+    addSpin(means[k].moment, spin, body);
+  }
+  List v, w, x;
+  eachSegment([&](const Segment& s) {
+    for (int slave = s.first; slave < s.last; ++slave) {
+      const auto [port, index] = slavePort[static_cast<std::size_t>(slave)];
+      if (port == none || slavePorts[port - first].body >= 0) continue;
+      for (List* list : {&v, &w, &x}) list->clear();
+      motion(s, slave, v, w, x);
+      const CornerMap map = portMap(port, index);
+      Resultant& mean = means[port - first];
+      add(mean.force, map.vv, v);
+      add(mean.force, map.vw, w);
+      add(mean.moment, map.wv, v);
+      add(mean.moment, map.ww, w);
+    }
+  });
+}
+
+Influences::Resultant Influences::resultant(std::size_t port, bool inertial) const {
+  Resultant sum;
+  const auto take = [&](const List& force, const List& moment, Pattern arm) {
+    add(sum.force, identityPattern, force);
+    add(sum.moment, arm, force);
+    add(sum.moment, identityPattern, moment);
+  };
+  const std::size_t body = static_cast<std::size_t>(model.nodes()) + port;
+  take(reactionForce[body], reactionMoment[body], {});
+  if (inertial) take(inertialForce[body], inertialMoment[body], {});
+  for (int member : model.ports[port].member) {
+    const std::size_t node = static_cast<std::size_t>(member);
+    take(reactionForce[node], reactionMoment[node], armOf(member));
+    take(nodeForce[node], nodeMoment[node], armOf(member));
+    if (inertial) take(inertialForce[node], inertialMoment[node], armOf(member));
+  }
+  return sum;
 }
 
 // D_i of the parameters (THEORY 4, lumped)
@@ -243,21 +455,24 @@ void Influences::findInertialLoads() {
     eachSegment([&](const Segment& s) { addInertialLoads(s); });
     return;
   }
+  std::vector<std::uint8_t> master(static_cast<std::size_t>(model.nodes()), 0);
+  for (const TieGroup& g : model.groups)
+    for (int node : g.node) master[static_cast<std::size_t>(node)] = 1;
   for (int node = 0; node < model.nodes(); ++node) {
+    if (!isFree(node) && !master[static_cast<std::size_t>(node)]) continue;  // a tie adds nothing to a point
     const Pattern mass = addedMass[node].empty() ? identityPattern : changing(identityPattern);
     const Pattern inertia = addedInertia[node].empty() ? identityPattern : changing(identityPattern);
-    const std::uint32_t a = acceleration(node), z = angularAcceleration(node);
-    add(inertialForce[node], mass, a);
-    add(inertialMoment[node], inertia, z);
-    if (a != noReference) add(inertialForce[node], moving(identityPattern), addedMass[node]);
-    if (z != noReference) add(inertialMoment[node], moving(identityPattern), addedInertia[node]);
+    addAcceleration(inertialForce[node], mass, node);
+    addAngularAcceleration(inertialMoment[node], inertia, node);
+    if (!inertialForce[node].empty()) add(inertialForce[node], moving(identityPattern), addedMass[node]);
+    if (!inertialMoment[node].empty()) add(inertialMoment[node], moving(identityPattern), addedInertia[node]);
     if (isFree(node)) coupled.push_back({node, node, {mass, {}, {}, inertia}});
   }
 }
 
 // T^T M_s (T q'' + b) of the slaves on one segment (THEORY 4, consistent)
 void Influences::addInertialLoads(const Segment& s) {
-  const int n = s.group.corners;
+  const int n = s.bodies;
   CornerMap maps[4], mass[4][4] = {};
   struct BiasLoad { Pattern forceV, forceW, momentV, momentW; } biases[4][4] = {};
   for (int slave = s.first; slave < s.last; ++slave) {
@@ -285,25 +500,25 @@ void Influences::addInertialLoads(const Segment& s) {
         biases[i][j].momentW = biases[i][j].momentW + vw * onW;
       }
       const Pattern any = moving(scalarPattern);
-      if (!vv.empty()) add(inertialForce[s.node[i]], any, massParameter);
-      if (!vw.empty()) add(inertialMoment[s.node[i]], any, massParameter);
-      if (!wv.empty()) add(inertialForce[s.node[i]], any, inertiaParameter);
-      if (!ww.empty()) add(inertialMoment[s.node[i]], any, inertiaParameter);
+      if (!vv.empty()) add(inertialForce[s.body[i]], any, massParameter);
+      if (!vw.empty()) add(inertialMoment[s.body[i]], any, massParameter);
+      if (!wv.empty()) add(inertialForce[s.body[i]], any, inertiaParameter);
+      if (!ww.empty()) add(inertialMoment[s.body[i]], any, inertiaParameter);
     }
   }
   for (int i = 0; i < n; ++i)
     for (int j = 0; j < n; ++j) {
-      const int node = s.node[i], other = s.node[j];
+      const int node = s.body[i], other = s.body[j];
       List& force = inertialForce[node];
       List& moment = inertialMoment[node];
-      add(force, mass[i][j].vv, acceleration(other));
-      add(force, mass[i][j].vw, angularAcceleration(other));
-      add(moment, mass[i][j].wv, acceleration(other));
-      add(moment, mass[i][j].ww, angularAcceleration(other));
-      add(force, biases[i][j].forceV, known(Field::velocity, other));
-      add(force, biases[i][j].forceW, known(Field::spin, other));
-      add(moment, biases[i][j].momentV, known(Field::velocity, other));
-      add(moment, biases[i][j].momentW, known(Field::spin, other));
+      addAcceleration(force, mass[i][j].vv, other);
+      addAngularAcceleration(force, mass[i][j].vw, other);
+      addAcceleration(moment, mass[i][j].wv, other);
+      addAngularAcceleration(moment, mass[i][j].ww, other);
+      addVelocity(force, biases[i][j].forceV, other);
+      addSpin(force, biases[i][j].forceW, other);
+      addVelocity(moment, biases[i][j].momentV, other);
+      addSpin(moment, biases[i][j].momentW, other);
       if (isFree(node) && isFree(other)) coupled.push_back({node, other, mass[i][j]});
     }
 }

@@ -125,6 +125,9 @@ template <class Archive>
 void field(Archive& a, TieGroup& g);
 
 template <class Archive>
+void field(Archive& a, Port& p);
+
+template <class Archive>
 void field(Archive& a, Finding& f) {
   int kind = f.kind;
   field(a, kind);
@@ -152,6 +155,18 @@ void field(Archive& a, TieGroup& g) {
   field(a, g.begin);
   field(a, g.weight);
   field(a, g.partEnd);
+}
+
+template <class Archive>
+void field(Archive& a, Port& p) {
+  field(a, p.name);
+  field(a, p.number);
+  field(a, p.ofSlaves);
+  field(a, p.member);
+  field(a, p.arm);
+  for (Vec3* v : {&p.place, &p.lever, &p.velocity, &p.spin}) field(a, *v);
+  field(a, p.turnWeight);
+  field(a, p.orientation);
 }
 
 template <class Archive>
@@ -188,6 +203,7 @@ void field(Archive& a, Model& m) {
   field(a, m.groups);
   field(a, m.springs);
   field(a, m.oriented);
+  field(a, m.ports);
   field(a, m.tieName);
   field(a, m.findings);
 }
@@ -279,14 +295,20 @@ void checkGroups(const Model& m) {
   require(next == m.slaveId.size(), "slave groups");
 }
 
-void checkSprings(const Model& m) {
-  std::size_t rotations = m.oriented.size();  // quaternions: of meanMotion segments, then of `oriented`
+// Quaternions: of meanMotion segments, then of `oriented`.
+std::size_t rotations(const Model& m) {
+  std::size_t count = m.oriented.size();
   for (const TieGroup& g : m.groups)
-    if (g.coupling == Coupling::meanMotion) rotations += g.begin.size() - 1;
+    if (g.coupling == Coupling::meanMotion) count += g.begin.size() - 1;
+  return count;
+}
+
+void checkSprings(const Model& m) {
+  const int orientations = static_cast<int>(rotations(m));
   const auto checkEnd = [&](const SpringEnd& e) {
     require(e.node >= -1 && e.node < m.nodes() && e.slave >= -1 && e.slave < m.slaves(), "ends of springs");
     require(e.node < 0 || e.slave < 0, "ends of springs");
-    require(e.orientation >= -1 && e.orientation < static_cast<int>(rotations), "ends of springs");
+    require(e.orientation >= -1 && e.orientation < orientations, "ends of springs");
   };
   for (const Spring& s : m.springs) {
     checkEnd(s.a);
@@ -302,6 +324,33 @@ void checkSprings(const Model& m) {
   }
 }
 
+void checkPorts(const Model& m) {
+  require(m.ports.empty() || m.settings.position == Position::integrated, "ports");
+  std::vector<std::uint8_t> ofPort[2] = {std::vector<std::uint8_t>(static_cast<std::size_t>(m.nodes())),
+                                         std::vector<std::uint8_t>(m.slaveId.size())};
+  const int orientations = static_cast<int>(rotations(m));
+  std::uint8_t slavesBefore = 0;
+  for (const Port& p : m.ports) {
+    require(p.ofSlaves <= 1 && p.ofSlaves >= slavesBefore, "ports");
+    slavesBefore = p.ofSlaves;
+    require(p.number >= 1 && !p.name.empty() && !p.member.empty(), "ports");
+    requireSize(p.arm, 3 * p.member.size(), "arms of ports");
+    requireFinite(p.arm, "arms of ports");
+    for (const Vec3* v : {&p.place, &p.lever, &p.velocity, &p.spin}) require(v->allFinite(), "ports");
+    require(std::isfinite(p.turnWeight) && p.turnWeight >= 0, "ports");
+    for (int k : p.member) {
+      auto& taken = ofPort[p.ofSlaves];
+      const auto place = static_cast<std::size_t>(k);
+      require(k >= 0 && place < taken.size() && !taken[place], "nodes of ports");
+      taken[place] = 1;
+      const bool fixedOrFree = k >= m.begin[rotatingFixedMaster] && k < m.begin[drivenMaster];
+      require(p.ofSlaves || !fixedOrFree, "nodes of ports");
+    }
+    if (!p.orientation.empty()) requireSize(p.orientation, p.member.size(), "rotations of ports");
+    for (int k : p.orientation) require(k >= -1 && k < orientations, "rotations of ports");
+  }
+}
+
 }  // namespace
 
 void checkModel(const Model& model) {
@@ -310,6 +359,7 @@ void checkModel(const Model& model) {
   checkSlaves(model);
   checkGroups(model);
   checkSprings(model);
+  checkPorts(model);
 }
 
 std::string writeResource(const Model& model, const std::string& guid) {

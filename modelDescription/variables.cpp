@@ -55,6 +55,13 @@ constexpr Row rows[] = {
     {"point", "f_ext", "point.f_ext", false, 3, "N", "external force on the node"},
     {"point", "t_ext", "point.t_ext", false, 3, "N.m", "external moment on the node"},
     {"point", "r", "point.r", true, 3, "m", "position"},
+    {"port", "v", "port.v", false, 3, "m/s", "velocity of the reference point"},
+    {"port", "w", "port.w", false, 3, "rad/s", "angular velocity"},
+    {"port", "a", "port.a", false, 3, "m/s2", "acceleration of the reference point"},
+    {"port", "z", "port.z", false, 3, "rad/s2", "angular acceleration"},
+    {"port", "f", "port.f", false, 3, "N", "resultant force"},
+    {"port", "t", "port.t", false, 3, "N.m", "resultant moment about the reference point"},
+    {"port", "r", "port.r", true, 3, "m", "position of the reference point"},
 };
 
 bool contains(const std::vector<std::string>& list, std::string_view name) {
@@ -70,15 +77,39 @@ bool isRotating(int group) { return group < freeMaster; }
 
 class Table {
  public:
-  Table(const Model& m, const Layout& l) : model(m), layout(l) {}
+  Table(const Model& m, const Layout& l)
+      : model(m), layout(l), nodeInPort(static_cast<std::size_t>(m.nodes())),
+        slaveInPort(static_cast<std::size_t>(m.slaves())) {
+    for (const Port& port : model.ports)
+      for (int k : port.member) (port.ofSlaves ? slaveInPort : nodeInPort)[static_cast<std::size_t>(k)] = 1;
+  }
 
-  // Nodes [first, last) of one group.
+  // Nodes [first, last) of one group. Those of a port have no variables, nor have its slaves.
   void nodes(int first, int last, bool master, std::string_view name, Field field, Causality causality) {
-    add(master ? "master" : "point", name, field, causality, first, last, model.nodeNumber, model.nodeId);
+    eachRun(nodeInPort, first, last, [&](int begin, int end) {
+      add(master ? "master" : "point", name, field, causality, begin, end, model.nodeNumber, model.nodeId);
+    });
   }
   // Slaves [0, last).
   void slaves(int last, std::string_view name, Field field, Causality causality) {
-    add("slave", name, field, causality, 0, last, model.slaveNumber, model.slaveId);
+    eachRun(slaveInPort, 0, last, [&](int begin, int end) {
+      add("slave", name, field, causality, begin, end, model.slaveNumber, model.slaveId);
+    });
+  }
+  // Ports of driven nodes or of slaves, which stand at `index` of the field and on.
+  void ports(bool ofSlaves, std::string_view name, Field field, Causality causality, int index = 0) {
+    std::vector<int> numbers(static_cast<std::size_t>(index));
+    std::vector<std::int64_t> ids(numbers.begin(), numbers.end());
+    std::vector<std::string> labels;
+    for (const Port& port : model.ports)
+      if (port.ofSlaves == ofSlaves) {
+        numbers.push_back(port.number);
+        ids.push_back(port.number);
+        labels.push_back(port.name);
+      }
+    const std::size_t before = blocks.size();
+    add("port", name, field, causality, index, static_cast<int>(numbers.size()), numbers, ids);
+    if (blocks.size() > before) blocks.back().labels = std::move(labels);
   }
   // Entry `index` of a field without nodes.
   void scalar(std::string_view name, Field field, Causality causality, int index = 0) {
@@ -98,6 +129,16 @@ class Table {
   }
 
  private:
+  template <class Body>
+  static void eachRun(const std::vector<std::uint8_t>& without, int first, int last, Body body) {
+    for (int i = first; i < last;) {
+      int end = i;
+      while (end < last && !without[static_cast<std::size_t>(end)]) ++end;
+      body(i, end);
+      i = end + 1;
+    }
+  }
+
   void add(std::string_view prefix, std::string_view name, Field field, Causality causality, int first, int last,
            const std::vector<int>& numbers, const std::vector<std::int64_t>& ids) {
     if (first == last) return;
@@ -129,6 +170,7 @@ class Table {
 
   const Model& model;
   const Layout& layout;
+  std::vector<std::uint8_t> nodeInPort, slaveInPort;
   std::vector<Block> blocks;
 };
 
@@ -220,7 +262,24 @@ void addScalars(Table& table, const Model& model) {
   table.scalar("drift", Field::drift, Causality::output);
 }
 
-void checkNames(const std::vector<std::string>& names, const char* table, bool extrasOnly) {
+void addPorts(Table& table, const Model& model) {
+  table.ports(false, "v", Field::portVelocity, Causality::input);
+  table.ports(false, "w", Field::portSpin, Causality::input);
+  if (model.accelerationInputs()) {
+    table.ports(false, "a", Field::portAcceleration, Causality::input);
+    table.ports(false, "z", Field::portAngularAcceleration, Causality::input);
+  }
+  table.ports(false, "f", Field::portReaction, Causality::output);
+  table.ports(false, "t", Field::portReactionMoment, Causality::output);
+  table.ports(true, "f", Field::portForce, Causality::input);
+  table.ports(true, "t", Field::portMoment, Causality::input);
+  table.ports(true, "v", Field::portMeanVelocity, Causality::output);
+  table.ports(true, "w", Field::portMeanSpin, Causality::output);
+  table.ports(false, "r", Field::portPosition, Causality::output);
+  table.ports(true, "r", Field::portPosition, Causality::output, static_cast<int>(model.drivenPorts()));
+}
+
+void checkNames(const std::vector<std::string>& names, const char* table, bool extrasOnly, bool ports) {
   for (const std::string& name : names) {
     std::string known;
     std::string_view last;
@@ -230,7 +289,7 @@ void checkNames(const std::vector<std::string>& names, const char* table, bool e
       if (!listed || r.listed == last) continue;
       last = r.listed;
       found = found || r.listed == name;
-      known += (known.empty() ? "" : ", ") + std::string(r.listed);
+      if (r.prefix != "port" || ports) known += (known.empty() ? "" : ", ") + std::string(r.listed);
     }
     if (!found) throw SceneError(std::string("interface: ") + table + ": unknown name '" + name + "'; known: " + known);
   }
@@ -243,19 +302,22 @@ std::vector<Block> variables(const Model& model, const Layout& layout) {
   addScalars(table, model);
   addNodes(table, model);
   addSlaves(table, model);
+  addPorts(table, model);
   return table.finish();
 }
 
 std::string variableName(const Block& block, std::size_t element, int component) {
   if (block.prefix.empty()) return block.name;
-  std::string name = block.prefix + "[" + std::to_string(block.numbers[element]) + "]." + block.name;
+  std::string name = block.prefix + "[";
+  name += block.labels.empty() ? std::to_string(block.numbers[element]) : block.labels[element];
+  name += "]." + block.name;
   if (block.components > 1) name += "[" + std::to_string(component + 1) + "]";
   return name;
 }
 
-void checkInterface(const Settings& settings) {
-  checkNames(settings.expose, "expose", true);
-  checkNames(settings.hide, "hide", false);
+void checkInterface(const Scene& scene) {
+  checkNames(scene.settings.expose, "expose", true, !scene.ports.empty());
+  checkNames(scene.settings.hide, "hide", false, !scene.ports.empty());
 }
 
 }  // namespace tiefmu

@@ -96,12 +96,12 @@ struct Place {  // of an element in the listing
   std::uint32_t block, element;
 };
 
-// Elements as a person reads them: first what belongs to no node, then masters, slaves, points by number.
+// Elements as a person reads them: first what belongs to no node, then ports, masters, slaves, points by number.
 std::vector<Place> listing(const std::vector<Block>& blocks) {
   std::vector<Place> places;
   for (std::uint32_t b = 0; b < blocks.size(); ++b) {
     const std::string& prefix = blocks[b].prefix;
-    const int order = prefix.empty() ? 0 : prefix == "master" ? 1 : prefix == "slave" ? 2 : 3;
+    const int order = prefix.empty() ? 0 : prefix == "port" ? 1 : prefix == "master" ? 2 : prefix == "slave" ? 3 : 4;
     for (std::uint32_t e = 0; e < blocks[b].numbers.size(); ++e)
       places.push_back({order, blocks[b].numbers[e], b, e});
   }
@@ -130,15 +130,35 @@ const char* causalityAttributes(Causality causality) {
   return "";
 }
 
-void appendHead(std::string& out, const Description& d, bool structured) {
+// Text on its way to the caller, handed over whenever there is a piece of it.
+class Out {
+ public:
+  explicit Out(const std::function<void(std::string_view)>& sink) : sink_(sink) { text_.reserve(piece + piece / 4); }
+  std::string& text() { return text_; }
+  void row() {
+    if (text_.size() > piece) flush();
+  }
+  void flush() {
+    sink_(text_);
+    text_.clear();
+  }
+
+ private:
+  static constexpr std::size_t piece = 1 << 20;
+  const std::function<void(std::string_view)>& sink_;
+  std::string text_;
+};
+
+void appendHead(std::string& out, const std::string& name, const std::string& title, const std::string& guid,
+                bool structured) {
   out += "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<fmiModelDescription fmiVersion=\"2.0\"";
-  attribute(out, "modelName", d.name);
-  attribute(out, "guid", d.guid);
-  if (!d.title.empty()) attribute(out, "description", d.title);
-  attribute(out, "generationTool", d.generationTool);
+  attribute(out, "modelName", name);
+  attribute(out, "guid", guid);
+  if (!title.empty()) attribute(out, "description", title);
+  attribute(out, "generationTool", "tiefmu");
   attribute(out, "variableNamingConvention", structured ? "structured" : "flat");
   out += ">\n<CoSimulation";
-  attribute(out, "modelIdentifier", modelIdentifier(d.name));
+  attribute(out, "modelIdentifier", modelIdentifier(name));
   out += R"( canHandleVariableCommunicationStepSize="true" canInterpolateInputs="true" maxOutputDerivativeOrder="1")"
          R"( canRunAsynchronuously="false" canBeInstantiatedOnlyOncePerProcess="false")"
          R"( canNotUseMemoryManagementFunctions="true" canGetAndSetFMUstate="true" canSerializeFMUstate="true")"
@@ -164,8 +184,9 @@ void appendDefinitions(std::string& out) {
   out += "</LogCategories>\n";
 }
 
-void appendVariables(std::string& out, const std::vector<Block>& blocks, const std::vector<Place>& places,
+void appendVariables(Out& to, const std::vector<Block>& blocks, const std::vector<Place>& places,
                      const double* start) {
+  std::string& out = to.text();
   std::vector<std::string> tails;  // what every variable of a block has in common, up to the start value
   for (const Block& b : blocks) {
     const auto unit =
@@ -188,8 +209,7 @@ void appendVariables(std::string& out, const std::vector<Block>& blocks, const s
       out += "\" description=\"";
       out += b.description;
       if (!b.prefix.empty()) {
-        out += " (node ";
-        out += std::to_string(b.ids[p.element]);
+        out += b.labels.empty() ? " (node " + std::to_string(b.ids[p.element]) : " (port " + b.labels[p.element];
         out += ')';
       }
       out += tails[p.block];
@@ -200,15 +220,16 @@ void appendVariables(std::string& out, const std::vector<Block>& blocks, const s
       }
       out += "/></ScalarVariable>\n";
     }
+    to.row();
   }
   out += "</ModelVariables>\n";
 }
 
-// Writes ModelStructure: outputs depend on inputs; initial unknowns on inputs and parameters.
+// ModelStructure: outputs depend on inputs; initial unknowns on inputs and parameters.
 class Structure {
  public:
-  Structure(std::string& text, const Model& model, const std::vector<Block>& table, const std::vector<Place>& places)
-      : out(text), blocks(table), listed(places), rows(dependencies(model, table)) {
+  Structure(const Model& model, const std::vector<Block>& table, const std::vector<Place>& places)
+      : blocks(table), listed(places), rows(dependencies(model, table)) {
     index.resize(rows.all.size());
     isParameter.resize(rows.all.size());
     std::uint32_t next = 1;
@@ -220,11 +241,11 @@ class Structure {
       }
   }
 
-  void append() {
-    out += "<ModelStructure>\n";
-    list("Outputs", false);
-    list("InitialUnknowns", true);
-    out += "</ModelStructure>\n";
+  void append(Out& out) const {
+    out.text() += "<ModelStructure>\n";
+    list(out, "Outputs", false);
+    list(out, "InitialUnknowns", true);
+    out.text() += "</ModelStructure>\n";
   }
 
  private:
@@ -233,27 +254,27 @@ class Structure {
     return b.reference + static_cast<std::size_t>(p.element) * b.components + component;
   }
 
-  void list(const char* element, bool initial) {
-    const std::size_t before = out.size();
-    out += std::string("<") + element + ">\n";
-    const std::size_t empty = out.size();
+  void list(Out& out, const char* element, bool initial) const {
+    const auto wanted = [&](const Block& b) {
+      return b.causality == Causality::output || (initial && b.causality == Causality::calculatedParameter);
+    };
+    // the schema wants at least one entry
+    if (std::none_of(blocks.begin(), blocks.end(), [&](const Block& b) { return wanted(b) && b.count() > 0; })) return;
+    out.text() += std::string("<") + element + ">\n";
     for (const Place& p : listed) {
-      const Causality c = blocks[p.block].causality;
-      if (c == Causality::output || (initial && c == Causality::calculatedParameter))
-        for (int k = 0; k < blocks[p.block].components; ++k) unknown(reference(p, k), initial);
+      if (!wanted(blocks[p.block])) continue;
+      for (int k = 0; k < blocks[p.block].components; ++k) unknown(out.text(), reference(p, k), initial);
+      out.row();
     }
-    if (out.size() == empty)
-      out.resize(before);  // the schema wants at least one entry
-    else
-      out += std::string("</") + element + ">\n";
+    out.text() += std::string("</") + element + ">\n";
   }
 
-  void unknown(std::size_t r, bool initial) {
+  void unknown(std::string& out, std::size_t r, bool initial) const {
     out += "<Unknown index=\"";
     appendNumber(out, index[r]);
     out += '"';
     if (!rows.all[r]) {
-      row.clear();
+      std::vector<Dependency> row;  // here `reference` is an index
       for (std::size_t i = rows.begin[r]; i < rows.begin[r + 1]; ++i) {
         const Dependency& d = rows.entries[i];
         if (initial || !isParameter[d.reference]) row.push_back({index[d.reference], d.kind});
@@ -265,29 +286,30 @@ class Structure {
         appendNumber(out, d.reference);
         out += ' ';
       }
-      closeList();
-      if (!initial) {  // in initialisation the standard knows no `fixed`, and the lists are half of a large file
+      closeList(out);
+      // Without the kinds all are `dependent`. In initialisation the standard knows no `fixed`; and the lists are half of
+      // a large file.
+      const auto plain = [](const Dependency& d) { return d.kind == Dependence::dependent; };
+      if (!initial && !std::all_of(row.begin(), row.end(), plain)) {
         out += " dependenciesKind=\"";
         for (const Dependency& d : row)
           out += d.kind == Dependence::constant ? "constant " : d.kind == Dependence::fixed ? "fixed " : "dependent ";
-        closeList();
+        closeList(out);
       }
     }
     out += "/>\n";
   }
 
-  void closeList() {
+  static void closeList(std::string& out) {
     if (out.back() == ' ') out.pop_back();
     out += '"';
   }
 
-  std::string& out;
   const std::vector<Block>& blocks;
   const std::vector<Place>& listed;
   const Dependencies rows;
   std::vector<std::uint32_t> index;  // of each value reference in the listing, from 1
   std::vector<std::uint8_t> isParameter;
-  std::vector<Dependency> row;  // here `reference` is an index
 };
 
 }  // namespace
@@ -302,29 +324,55 @@ std::string modelIdentifier(const std::string& name) {
   return identifier.empty() ? "_" : identifier;
 }
 
-std::string xml(const Model& model, const Description& description) {
-  // The model is the caller's and outlives the simulation.
-  Simulation simulation(std::shared_ptr<const Model>(std::shared_ptr<void>(), &model));
-  const std::vector<double> start(simulation.data(), simulation.data() + simulation.layout().size);
-  simulation.initialise(0);
-  const std::vector<Block> blocks = variables(model, simulation.layout());
-  const std::vector<Place> places = listing(blocks);
-  std::size_t count = 0;
-  for (const Block& b : blocks) count += b.count();
+struct Xml::Contents {
+  std::string name, title;
+  bool structuredNames = true;
+  std::vector<double> start;
+  Experiment experiment;
+  std::vector<Block> blocks;
+  std::vector<Place> places;
+  Structure structure;
 
-  std::string out;
-  appendHead(out, description, count <= mostStructuredNames);
-  appendDefinitions(out);
-  const Experiment experiment = defaultExperiment(model, simulation);
-  out += "<DefaultExperiment startTime=\"0\" stopTime=\"";
-  appendNumber(out, experiment.stop);
-  out += "\" stepSize=\"";
-  appendNumber(out, experiment.step);
-  out += "\"/>\n";
-  appendVariables(out, blocks, places, start.data());
-  Structure(out, model, blocks, places).append();
-  out += "</fmiModelDescription>\n";
-  return out;
+  Contents(const Model& model, std::string n, std::string t)
+      : Contents(model, Simulation(std::shared_ptr<const Model>(std::shared_ptr<void>(), &model)), std::move(n),
+                 std::move(t)) {}
+
+ private:
+  Contents(const Model& model, Simulation&& simulation, std::string n, std::string t)
+      : name(std::move(n)),
+        title(std::move(t)),
+        start(simulation.data(), simulation.data() + simulation.layout().size),
+        experiment((simulation.initialise(0), defaultExperiment(model, simulation))),
+        blocks(variables(model, simulation.layout())),
+        places(listing(blocks)),
+        structure(model, blocks, places) {
+    std::size_t count = 0;
+    for (const Block& b : blocks) count += b.count();
+    // Structured names have numbers in brackets, where ports have names.
+    structuredNames = count <= mostStructuredNames && model.ports.empty();
+  }
+};
+
+Xml::Xml(const Model& model, std::string name, std::string title)
+    : contents_(std::make_unique<Contents>(model, std::move(name), std::move(title))) {}
+Xml::~Xml() = default;
+
+double Xml::stepSize() const { return contents_->experiment.step; }
+
+void Xml::write(const std::string& guid, const std::function<void(std::string_view)>& sink) const {
+  const Contents& c = *contents_;
+  Out out(sink);
+  appendHead(out.text(), c.name, c.title, guid, c.structuredNames);
+  appendDefinitions(out.text());
+  out.text() += "<DefaultExperiment startTime=\"0\" stopTime=\"";
+  appendNumber(out.text(), c.experiment.stop);
+  out.text() += "\" stepSize=\"";
+  appendNumber(out.text(), c.experiment.step);
+  out.text() += "\"/>\n";
+  appendVariables(out, c.blocks, c.places, c.start.data());
+  c.structure.append(out);
+  out.text() += "</fmiModelDescription>\n";
+  out.flush();
 }
 
 }  // namespace tiefmu

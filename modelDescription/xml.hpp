@@ -1,7 +1,10 @@
 // modelDescription.xml of FMI 2.0 co-simulation.
 #pragma once
 
+#include <functional>
+#include <memory>
 #include <string>
+#include <string_view>
 
 #include "../src/model.hpp"
 
@@ -21,18 +24,24 @@ inline constexpr LogCategory logCategories[] = {
     {"logAll", "Everything"},
 };
 
-struct Description {
-  std::string name;   // of the scene: modelName, and the model identifier as far as C allows
-  std::string title;  // free text; may be empty
-  std::string guid;   // what fmi2Instantiate compares
-  std::string generationTool = "tiefmu";
-};
-
 // `name` with everything but letters, digits and _ replaced by _, and an _ in front of a digit: a C identifier, and the
 // file name of the FMU's binary.
 std::string modelIdentifier(const std::string& name);
 
-// Throws SceneError where the model cannot start (see Simulation::initialise).
-std::string xml(const Model& model, const Description& description);
+// The text of a model, which must outlive it. Analysed once, written as often as asked for.
+class Xml {
+ public:
+  // name: of the scene: modelName, and the model identifier as far as C allows. title: free text; may be empty.
+  // Throws SceneError where the model cannot start (see Simulation::initialise).
+  Xml(const Model& model, std::string name, std::string title);
+  ~Xml();
+  double stepSize() const;  // of the default experiment, s
+  // guid: what fmi2Instantiate compares. Large models take hundreds of megabytes: `sink` gets the text piece by piece.
+  void write(const std::string& guid, const std::function<void(std::string_view)>& sink) const;
+
+ private:
+  struct Contents;
+  std::unique_ptr<const Contents> contents_;
+};
 
 }  // namespace tiefmu

@@ -75,9 +75,13 @@ void Dynamics::directional(double* dot) {
   if (has(Field::position) && !drivenMove_) dx = seed(Field::position);
   const double* shapeChange = model.finite() ? dx : nullptr;
 
+  if (ports.anyDriven()) ports.moveChange(dot);
+
   // f_s
   std::copy_n(seed(Field::slaveForce), c.load.size(), c.load.begin());
   std::copy_n(seed(Field::slaveMoment), c.moment.size(), c.moment.begin());
+  if (ports.anyOfSlaves())
+    ports.spread(seed(Field::portForce), seed(Field::portMoment), c.load.data(), c.moment.data());
   std::fill(c.node.begin(), c.node.end(), 0.0);
   std::fill(c.nodeMoment.begin(), c.nodeMoment.end(), 0.0);
   if (has(Field::nodeForce)) {
@@ -196,6 +200,12 @@ void Dynamics::directional(double* dot) {
   }
   std::copy(c.f.begin(), c.f.end(), seed(Field::reactionForce));
   std::copy(c.t.begin(), c.t.end(), seed(Field::reactionMoment));
+  if (ports.anyDriven()) {
+    ports.gather(c.f.data(), c.t.data(), seed(Field::portReaction), seed(Field::portReactionMoment));
+    if (!model.springs.empty())
+      ports.gather(c.node.data(), c.nodeMoment.data(), seed(Field::portReaction), seed(Field::portReactionMoment));
+  }
+  if (ports.anyOfSlaves()) ports.mean(vs, ws, seed(Field::portMeanVelocity), seed(Field::portMeanSpin));
   if (has(Field::energy)) {
     double kinetic = 0;
     for (int s = 0; s < model.slaves(); ++s)

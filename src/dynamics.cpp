@@ -18,15 +18,6 @@ std::string number(double value) {
   return text;
 }
 
-void turnQuaternion(double* q, const Vec3& angle) {
-  const Quat next = exponential(angle) * Quat(q[0], q[1], q[2], q[3]);
-  const double scale = 1.5 - 0.5 * next.squaredNorm();  // Newton step of 1/norm, which is 1 up to rounding
-  q[0] = scale * next.w();
-  q[1] = scale * next.x();
-  q[2] = scale * next.y();
-  q[3] = scale * next.z();
-}
-
 // dq/dt = (0, w) q / 2
 void quaternionRate(const double* q, const Vec3& w, double* rate) {
   const Quat r = Quat(0, 0.5 * w.x(), 0.5 * w.y(), 0.5 * w.z()) * Quat(q[0], q[1], q[2], q[3]);
@@ -38,7 +29,7 @@ void quaternionRate(const double* q, const Vec3& w, double* rate) {
 
 }  // namespace
 
-Dynamics::Dynamics(const Model& m, const Layout& l, double* d) : model(m), layout(l), data(d) {
+Dynamics::Dynamics(const Model& m, const Layout& l, double* d) : model(m), layout(l), data(d), ports(m, l, d) {
   const std::size_t n = model.nodes(), r = model.rotating(), s = model.slaves(), u = model.turning();
   for (const TieGroup& group : model.groups) {
     firstFrame_.push_back(frames_.size());
@@ -61,6 +52,9 @@ Dynamics::Dynamics(const Model& m, const Layout& l, double* d) : model(m), layou
   for (const Spring& spring : model.springs)
     for (const SpringEnd* end : {&spring.a, &spring.b})
       if (end->slave >= 0) holds[end->slave] = 1;
+  for (const Port& port : model.ports)
+    if (port.ofSlaves)
+      for (int slave : port.member) holds[slave] = 1;
   for (int g = 0; g < static_cast<int>(model.groups.size()); ++g) {
     const TieGroup& group = model.groups[g];
     for (int e = 0; e < group.segments(); ++e) {
@@ -70,7 +64,7 @@ Dynamics::Dynamics(const Model& m, const Layout& l, double* d) : model(m), layou
       else sprung_.push_back({g, {e, e + 1}});
     }
   }
-  if (springs || gravity_) {
+  if (springs || gravity_ || ports.anyOfSlaves()) {
     load_.resize(3 * s);
     moment_.resize(3 * u);
   }
@@ -84,12 +78,12 @@ Dynamics::Dynamics(const Model& m, const Layout& l, double* d) : model(m), layou
   }
   const bool small = has(Field::position) && !model.finite();
   const bool stages = model.settings.method == Method::rk4 && model.anyFree();
-  if (springs || energy || stages || small) {
+  if (springs || energy || stages || small || ports.anyOfSlaves()) {
     vs_.resize(3 * s);
     ws_.resize(3 * u);
   }
+  if (springs || ports.anyOfSlaves()) xs_.resize(3 * s);
   if (springs) {
-    xs_.resize(3 * s);
     tangent_.resize(3 * s);
     tangentMoment_.resize(3 * u);
   }
@@ -100,7 +94,7 @@ Dynamics::Dynamics(const Model& m, const Layout& l, double* d) : model(m), layou
     rightMoment_.resize(3 * r);
   }
   if (small) displacement_.resize(3 * n);
-  if (consistent && model.anyFree()) inertia_ = std::make_unique<ConsistentInertia>(model);
+  if (consistent && model.anyFree()) inertia_ = ConsistentInertia::of(model);
 }
 
 TieGeometry Dynamics::geometry(std::size_t g) const {
@@ -123,6 +117,7 @@ void Dynamics::setStart() {
   fill(field(Field::offset), layout[Field::offset].count, model.slaveOffset);
   for (Field f : {Field::segmentRotation, Field::orientation})
     for (std::size_t k = 0; k < layout[f].count; k += 4) field(f)[k] = 1;
+  ports.setStart();
   *field(Field::stableTimeStep) = *field(Field::nodalTimeStep) = 1e30;
 }
 
@@ -295,8 +290,13 @@ void Dynamics::gatherLoads() {
   if (gravity_)
     for (int s = 0; s < model.slaves(); ++s)
       at(load_.data(), s) += field(Field::slaveMass)[s] * model.settings.gravity;
+  if (xs_.empty()) return;
+  if (has(Field::position)) placeSlaves(xs_.data(), true);
+  if (ports.anyOfSlaves()) {
+    ports.shape(xs_.data(), [&](int k) { return quaternion(k); });
+    ports.spread(field(Field::portForce), field(Field::portMoment), load_.data(), moment_.data());
+  }
   if (model.springs.empty()) return;
-  placeSlaves(xs_.data(), true);
   const double *v = velocityFor(Field::lagged), *w = spinFor(Field::lagged);
   eachSprung([&](const TieGroup& group, SegmentRange range, TieGeometry shape, std::size_t) {
     follow(group, range, shape, v, w, vs_.data(), ws_.data());
@@ -434,12 +434,20 @@ void Dynamics::takeDrivenVelocities() {
 
 void Dynamics::inputsOver(double tau, double h) {
   if (inputs.active()) inputs.over(tau, h, data);
+  if (ports.anyDriven()) ports.carry(inputs, tau, h);
 }
 
-void Dynamics::inputsAt(double tau) {
-  if (!inputs.active()) return;
-  inputs.at(tau, data);
-  if (!drivenMove_) updateGeometry();
+void Dynamics::inputsAt(double tau, double h) {
+  if (inputs.active()) {
+    inputs.at(tau + h, data);
+    if (!drivenMove_) updateGeometry();
+  }
+  if (ports.anyDriven()) ports.advance(inputs, tau, h);
+}
+
+void Dynamics::movePorts() {
+  ports.move();
+  takeDrivenVelocities();
 }
 
 // value += h rate
@@ -590,6 +598,17 @@ void Dynamics::updateOutputs() {
     }
   }
   if (has(Field::slavePosition)) placeSlaves(field(Field::slavePosition), false);
+  if (ports.anyDriven()) {
+    double *force = field(Field::portReaction), *moment = field(Field::portReactionMoment);
+    std::fill_n(force, layout[Field::portReaction].count, 0.0);
+    std::fill_n(moment, layout[Field::portReactionMoment].count, 0.0);
+    ports.gather(f, t, force, moment);
+    if (!model.springs.empty()) ports.gather(nodeLoad_.data(), nodeMoment_.data(), force, moment);
+  }
+  if (ports.anyOfSlaves())
+    ports.mean(field(Field::slaveVelocity), field(Field::slaveSpin), field(Field::portMeanVelocity),
+               field(Field::portMeanSpin));
+  if (has(Field::portPosition)) ports.places(xs_.data(), field(Field::portPosition));
   if (has(Field::energy)) {
     const double* work = field(Field::work);
     double* e = field(Field::energy);
@@ -643,6 +662,7 @@ Dynamics::Power Dynamics::power() {
     p.external += (at(field(Field::slaveForce), s) + field(Field::slaveMass)[s] * g).dot(at(vs_.data(), s));
   for (int s = 0; s < model.turning(); ++s)
     p.external += at(field(Field::slaveMoment), s).dot(at(ws_.data(), s));
+  if (ports.anyOfSlaves()) p.external += ports.power(vs_.data(), ws_.data());
   if (!model.anyDriven()) return p;
   // The driven nodes' part: what holds them against springs and tie, inertia included.
   std::fill(right_.begin(), right_.end(), 0.0);
@@ -688,16 +708,11 @@ void Dynamics::springOperator(const double* u, const double* turn, double* f, do
   });
 }
 
-void Dynamics::solveInertia(double* f, double* t) {
+void Dynamics::solveInertia(const double* f, const double* t, double* a, double* z) {
   const int first = model.freeBegin(), last = model.freeEnd(), turning = model.rotating();
-  if (inertia_) {
-    std::copy_n(f, right_.size(), right_.begin());
-    std::copy_n(t, rightMoment_.size(), rightMoment_.begin());
-    inertia_->solve(right_.data() + 3 * first, rightMoment_.data() + 3 * first, f + 3 * first, t + 3 * first);
-    return;
-  }
-  for (int i = first; i < last; ++i) at(f, i) /= model.nodeMass[i] + field(Field::addedMass)[i];
-  for (int i = first; i < turning; ++i) at(t, i) /= model.nodeInertia[i] + field(Field::addedInertia)[i];
+  if (inertia_) return inertia_->solve(f + 3 * first, t + 3 * first, a + 3 * first, z + 3 * first);
+  for (int i = first; i < last; ++i) at(a, i) = at(f, i) / (model.nodeMass[i] + field(Field::addedMass)[i]);
+  for (int i = first; i < turning; ++i) at(z, i) = at(t, i) / (model.nodeInertia[i] + field(Field::addedInertia)[i]);
 }
 
 }  // namespace tiefmu

@@ -10,6 +10,7 @@
 #include "inertia.hpp"
 #include "input_curve.hpp"
 #include "layout.hpp"
+#include "port.hpp"
 #include "spring.hpp"
 #include "tie.hpp"
 #include "workers.hpp"
@@ -52,10 +53,13 @@ class Dynamics {
   void drift(double h, double ahead);
   // d/dt of the fields velocity .. work at the present state, for a Runge-Kutta stage. `rates` starts at velocity.
   void rates(double* rates);
-  // Inputs that move inside the step; no-ops where none does. Before a drift their mean over it, after it their end.
+  // Inputs and ports that move inside the step; no-ops where none does. Before a drift from tau to tau + h the
+  // inputs' mean over it, after it their end.
   InputCurve inputs;
+  Ports ports;
   void inputsOver(double tau, double h);
-  void inputsAt(double tau);
+  void inputsAt(double tau, double h);
+  void movePorts();  // the ports' nodes, after inputs have changed
   void normalise();  // offsets and rotations back to their length after a Runge-Kutta step
 
   // Outputs at the present state. `evaluate` (or evaluateReactions) must be up to date.
@@ -73,8 +77,8 @@ class Dynamics {
   // Restoring loads K u (or damping C u) of the springs for a motion of the free nodes: u 3 per node, turn 3 per
   // rotating node, zero where not free; f, t likewise.
   void springOperator(const double* u, const double* turn, double* f, double* t, bool damping);
-  // M^-1 of the free nodes, in place on node arrays.
-  void solveInertia(double* f, double* t);
+  // M^-1 of the free nodes, on node arrays: loads f, t to accelerations a, z, which hold a guess on entry.
+  void solveInertia(const double* f, const double* t, double* a, double* z);
 
   // Change of every output, in `dot` laid out like `data`, with the inputs' change given there. Outputs must be up to
   // date. Allocates at the first call.

@@ -26,12 +26,19 @@ class InputCurve {
 
   void begin(const double* data);                          // tau = 0: the inputs as they stand
   void at(double tau, double* data) const;                 // inputs at tau
+  // The vector at `place`, at tau and its mean over [tau, tau + h], whatever `data` holds of what moves.
+  Vec3 at(std::size_t place, double tau, const double* data) const;
+  Vec3 mean(std::size_t place, double tau, double h, const double* data) const;
   void over(double tau, double h, double* data) const;     // velocities and spins at their mean over [tau, tau + h]
 
  private:
   struct Entry : InputDerivatives {
     bool motion;  // velocity or spin
     double base;
+    double at(double tau) const { return base + tau * (first + 0.5 * tau * second); }
+    double mean(double tau, double h) const {
+      return base + (tau + 0.5 * h) * first + 0.5 * (tau * (tau + h) + h * h / 3) * second;
+    }
   };
   std::vector<Entry> entries_;
   std::vector<int> index_;  // place -> entry + 1

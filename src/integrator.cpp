@@ -24,7 +24,7 @@ bool Integrator::step(double tau, double h) {
       d.kick(0.5 * h);
       d.inputsOver(tau, h);
       d.drift(h, 0);
-      d.inputsAt(tau + h);
+      d.inputsAt(tau, h);
       d.setForceVelocities(0.5 * h, false);
       d.evaluate();
       d.kick(0.5 * h);
@@ -33,7 +33,7 @@ bool Integrator::step(double tau, double h) {
       d.kick(h);
       d.inputsOver(tau, h);
       d.drift(h, 0);
-      d.inputsAt(tau + h);
+      d.inputsAt(tau, h);
       d.setForceVelocities(0, true);
       return false;
     case Method::nohBathe: {
@@ -41,7 +41,7 @@ bool Integrator::step(double tau, double h) {
       double* a = d.field(Field::acceleration);  // angular accelerations follow
       d.inputsOver(tau, h1);
       d.drift(h1, 0.5 * h1);
-      d.inputsAt(tau + h1);
+      d.inputsAt(tau, h1);
       d.setForceVelocities(h1, true);
       d.kick(0.5 * h1);
       std::copy_n(a, earlier_.size(), earlier_.begin());
@@ -49,7 +49,7 @@ bool Integrator::step(double tau, double h) {
       d.kick(0.5 * h1);
       d.inputsOver(tau + h1, h2);
       d.drift(h2, 0.5 * h2);
-      d.inputsAt(tau + h);
+      d.inputsAt(tau + h1, h2);
       d.setForceVelocities(h2, true);
       // v += h2 (q0 a_0 + (1/2 + q1) a_1 + q2 a_2)
       d.kick((0.5 + nohBathe::q1) * h2);
@@ -76,7 +76,7 @@ void Integrator::rungeKutta(double tau, double h) {
   for (int stage = 0; stage < 4; ++stage) {
     if (stage > 0) {
       for (std::size_t k = 0; k < size; ++k) y[k] = start_[k] + ahead[stage - 1] * h * rates_[k];
-      d.inputsAt(tau + ahead[stage - 1] * h);
+      d.inputsAt(tau, ahead[stage - 1] * h);
       d.updateGeometry();
       d.setForceVelocities(0, true);
       d.evaluate();
@@ -87,7 +87,7 @@ void Integrator::rungeKutta(double tau, double h) {
       for (std::size_t k = 0; k < size; ++k) sum_[k] += weight[stage] * rates_[k];
   }
   for (std::size_t k = 0; k < size; ++k) y[k] = start_[k] + h / 6 * sum_[k];
-  d.inputsAt(tau + h);
+  d.inputsAt(tau, h);
   d.normalise();
   d.updateGeometry();
   d.setForceVelocities(0, true);

@@ -6,6 +6,7 @@ namespace tiefmu {
 
 Layout::Layout(const Model& model) {
   const std::size_t n = model.nodes(), r = model.rotating(), s = model.slaves(), u = model.turning();
+  const std::size_t p = model.drivenPorts(), q = model.ports.size() - p;
   const auto any = [&](auto predicate) { return std::any_of(model.springs.begin(), model.springs.end(), predicate); };
   std::size_t meanMotion = 0;
   bool offsets = false, rotation = false;
@@ -42,6 +43,12 @@ Layout::Layout(const Model& model) {
   put(Field::nodeMoment, dynamic ? 3 * r : 0);
   put(Field::slaveForce, 3 * s);
   put(Field::slaveMoment, 3 * u);
+  put(Field::portForce, 3 * q);
+  put(Field::portMoment, 3 * q);
+  put(Field::portVelocity, 3 * p);
+  put(Field::portSpin, 3 * p);
+  put(Field::portAcceleration, model.accelerationInputs() ? 3 * p : 0);
+  put(Field::portAngularAcceleration, model.accelerationInputs() ? 3 * p : 0);
   put(Field::acceleration, accelerations ? 3 * n : 0);
   put(Field::angularAcceleration, accelerations ? 3 * r : 0);
   put(Field::velocity, 3 * n);
@@ -51,6 +58,8 @@ Layout::Layout(const Model& model) {
   put(Field::segmentRotation, segmentTurns ? 4 * meanMotion : 0);
   put(Field::orientation, 4 * model.oriented.size());
   put(Field::angle, !model.finite() && model.needsPositions() && rotation ? 3 * r : 0);
+  put(Field::portPlace, 3 * p);
+  put(Field::portRotation, model.finite() ? 4 * p : 0);
   put(Field::work, model.exposes("energy") ? 4 : 0);
   put(Field::lagged, dynamic && damping ? 3 * (n + r) : 0);
   put(Field::predicted,
@@ -65,6 +74,11 @@ Layout::Layout(const Model& model) {
   put(Field::reactionMoment, 3 * r);
   put(Field::slavePosition, model.exposes("slave.r") ? 3 * s : 0);
   put(Field::slaveAcceleration, model.exposes("slave.a") ? 3 * s : 0);
+  put(Field::portReaction, 3 * p);
+  put(Field::portReactionMoment, 3 * p);
+  put(Field::portMeanVelocity, 3 * q);
+  put(Field::portMeanSpin, 3 * q);
+  put(Field::portPosition, model.exposes("port.r") ? 3 * (p + q) : 0);
   put(Field::energy, model.exposes("energy") ? 5 : 0);
   put(Field::powerResidual, model.exposes("power_residual") ? 1 : 0);
   put(Field::drift, model.exposes("drift") ? 1 : 0);

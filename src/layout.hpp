@@ -8,7 +8,8 @@
 
 namespace tiefmu {
 
-// Fields of the array, 3 doubles an entry for vectors. n: all nodes; r: rotating nodes; s: slaves; u: turning slaves.
+// Fields of the array, 3 doubles an entry for vectors. n: all nodes; r: rotating nodes; s: slaves; u: turning slaves;
+// p, q: ports of driven nodes, of slaves.
 enum class Field : int {
   // parameters
   timeStep, safety, threads, slaveMass /*s*/, slaveInertia /*u*/,
@@ -16,11 +17,14 @@ enum class Field : int {
   addedMass /*n*/, addedInertia /*r*/, stiffness /*n*/, rotationalStiffness /*r*/,
   // inputs
   nodeForce /*3n*/, nodeMoment /*3r*/, slaveForce /*3s*/, slaveMoment /*3u*/,
+  portForce /*3q*/, portMoment /*3q*/, portVelocity /*3p*/, portSpin /*3p*/, portAcceleration /*3p*/,
+  portAngularAcceleration /*3p*/,
   // motion: inputs where a node is driven, states or results where it is free, zero where it is fixed
   acceleration /*3n*/, angularAcceleration /*3r*/, velocity /*3n*/, spin /*3r*/, position /*3n*/,
   // further states
   offset /*3u: d now*/, segmentRotation /*4 per meanMotion segment*/, orientation /*4 per Model::oriented*/,
   angle /*3r: integral of spin, where small displacements are integrated*/,
+  portPlace /*3p: reference points*/, portRotation /*4p: since the start*/,
   work /*external, dissipated, total at the start, total at the end of the last step*/,
   lagged /*3n + 3r: velocity and spin that the last damping forces used*/,
   predicted /*3n + 3r: those that the last bias used*/, mode /*of the highest frequency: 3 per free unknown*/,
@@ -29,6 +33,8 @@ enum class Field : int {
   // outputs
   slaveVelocity /*3s*/, slaveSpin /*3u*/, reactionForce /*3n*/, reactionMoment /*3r*/,
   slavePosition /*3s*/, slaveAcceleration /*3s*/,
+  portReaction /*3p*/, portReactionMoment /*3p*/, portMeanVelocity /*3q*/, portMeanSpin /*3q*/,
+  portPosition /*3(p + q)*/,
   energy /*kinetic, strain, dissipated, external, residual*/, powerResidual, drift, stableTimeStep, nodalTimeStep,
   count
 };

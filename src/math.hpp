@@ -39,6 +39,16 @@ inline Quat exponential(const Vec3& angle) {
   return Quat(c, v.x(), v.y(), v.z());
 }
 
+// q (w, x, y, z) turned by the rotation vector `angle` (rad), its length held at 1 to rounding.
+inline void turnQuaternion(double* q, const Vec3& angle) {
+  const Quat next = exponential(angle) * Quat(q[0], q[1], q[2], q[3]);
+  const double scale = 1.5 - 0.5 * next.squaredNorm();  // Newton step of 1/norm, which is 1 up to rounding
+  q[0] = scale * next.w();
+  q[1] = scale * next.x();
+  q[2] = scale * next.y();
+  q[3] = scale * next.z();
+}
+
 // Rotation vector (rad, length in [0, pi]) of a unit quaternion: the inverse of `exponential`.
 inline Vec3 logarithm(const Quat& q) {
   const double sign = q.w() < 0 ? -1.0 : 1.0;

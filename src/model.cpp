@@ -1,11 +1,14 @@
 #include "model.hpp"
 
+#include <Eigen/Eigenvalues>
+#include <Eigen/QR>
 #include <algorithm>
 #include <cstdio>
 #include <numeric>
 #include <tuple>
 
 #include "ordering.hpp"
+#include "port.hpp"
 #include "search.hpp"
 
 namespace tiefmu {
@@ -37,6 +40,8 @@ class Compiler {
     model.settings = scene.settings;
     if (scene.settings.inertia == Inertia::lumped && scene.settings.reaction == Reaction::split)
       throw SceneError("model: reaction: 'split' needs inertia = 'consistent' (with lumped inertia it equals 'loads')");
+    if (!scene.ports.empty() && scene.settings.position == Position::input)
+      throw SceneError("interface: ports: need position = 'integrated' in [model]: a port's nodes move with the port");
     if (scene.settings.safety > 1)
       warn("integrator: safety = " + text(scene.settings.safety) +
            " lets steps be longer than the stability limit: expect the solution to diverge");
@@ -47,6 +52,8 @@ class Compiler {
     placeNodes();
     placeSlaves();
     placeSprings();
+    for (const bool ofSlaves : {false, true})
+      for (int k = 0; k < static_cast<int>(scene.ports.size()); ++k) placePort(k, ofSlaves);
     adviseOnInertia();
     return std::move(model);
   }
@@ -62,6 +69,7 @@ class Compiler {
   std::vector<int> nodeIndex, slaveIndex;  // per scene node: index in the model, or -1
   std::vector<int> segmentRotation;   // per slave of the model: index of its meanMotion segment, or -1
   std::vector<std::vector<int>> partEnds;  // per group
+  std::vector<int> orientationOfSlave, orientationOfNode;  // per slave and node of the model: quaternion, or -1
   int meanMotionSegments = 0;
 
   void warn(std::string line) { model.findings.push_back({Finding::warning, std::move(line)}); }
@@ -398,22 +406,24 @@ class Compiler {
     return end.slave >= 0 ? end.slave < model.turningSlaves : end.node >= 0 && end.node < model.rotating();
   }
 
-  void placeSprings() {
-    std::vector<int> orientationOfSlave(bonds.size(), -1), orientationOfNode(model.nodeId.size(), -1);
-    // Quaternions are counted through: first those of the meanMotion segments, then those of `oriented`.
-    const auto orient = [&](SpringEnd& end) {
-      if (end.slave >= 0 && segmentRotation[end.slave] >= 0) {
-        end.orientation = segmentRotation[end.slave];
-        return;
-      }
-      int& index = end.slave >= 0 ? orientationOfSlave[end.slave] : orientationOfNode[end.node];
-      if (index < 0) {
-        index = meanMotionSegments + static_cast<int>(model.oriented.size());
-        end.orientation = index;
-        model.oriented.push_back(end);
-      }
+  // Quaternions are counted through: first those of the meanMotion segments, then those of `oriented`.
+  void orient(SpringEnd& end) {
+    if (end.slave >= 0 && segmentRotation[end.slave] >= 0) {
+      end.orientation = segmentRotation[end.slave];
+      return;
+    }
+    int& index = end.slave >= 0 ? orientationOfSlave[end.slave] : orientationOfNode[end.node];
+    if (index < 0) {
+      index = meanMotionSegments + static_cast<int>(model.oriented.size());
       end.orientation = index;
-    };
+      model.oriented.push_back(end);
+    }
+    end.orientation = index;
+  }
+
+  void placeSprings() {
+    orientationOfSlave.assign(bonds.size(), -1);
+    orientationOfNode.assign(model.nodeId.size(), -1);
     for (const SceneSpring& spec : scene.springs) {
       const std::string where = spec.name + ": ";
       Spring spring{};
@@ -474,6 +484,102 @@ class Compiler {
            scene.ties[b.tie].name + "' have no rotations; use formulation = \"optimized\"";
   }
 
+  // Finds the nodes of the port in the model; keeps it if it is one of slaves, or of driven nodes, as asked.
+  void placePort(int k, bool ofSlaves) {
+    const ScenePort& spec = scene.ports[k];
+    const std::string where = "interface: port '" + spec.name + "': ";
+    Port port;
+    port.name = spec.name;
+    port.number = k + 1;
+    int slave = -1, other = -1;
+    for (int node : spec.nodes) {
+      if (!bound[node] && nodeIndex[node] < 0) {
+        if (spec.listed) throw SceneError(where + "node " + id(node) + ": no tie and no spring uses it");
+        continue;
+      }
+      (bound[node] ? slave : other) = node;
+      if (!bound[node] && scene.nodes.motion[node] != Motion::driven)
+        throw SceneError(where + "node " + id(node) + ": is " +
+                         (scene.nodes.motion[node] == Motion::free ? "free" : "fixed") +
+                         "; a port moves driven nodes or loads slaves");
+      if (slave >= 0 && other >= 0)
+        throw SceneError(where + "holds slaves (node " + id(slave) + ") and nodes that are none (node " + id(other) +
+                         "); make two ports of them");
+      port.member.push_back(bound[node] ? slaveIndex[node] : nodeIndex[node]);
+    }
+    if (port.member.empty()) throw SceneError(where + "no tie and no spring uses any of its nodes");
+    port.ofSlaves = slave >= 0;
+    if (port.ofSlaves != ofSlaves) return;
+    if (port.member.size() < spec.nodes.size())
+      note(where + std::to_string(spec.nodes.size() - port.member.size()) + " of " +
+           std::to_string(spec.nodes.size()) + " nodes left out: no tie and no spring uses them");
+    std::sort(port.member.begin(), port.member.end());
+    const auto position = [&](int member) {
+      return port.ofSlaves ? scene.nodes.position[bonds[member].slave] : Vec3(at(model.nodePosition.data(), member));
+    };
+    Vec3 mean = Vec3::Zero();
+    for (int member : port.member) mean += position(member) / static_cast<double>(port.member.size());
+    port.place = spec.atMean ? mean : spec.at;
+    if (port.ofSlaves) port.lever = port.place - mean;
+    for (int member : port.member) {
+      const Vec3 arm = position(member) - (port.ofSlaves ? mean : port.place);
+      port.arm.insert(port.arm.end(), arm.begin(), arm.end());
+    }
+    if (port.ofSlaves) resolveTurn(port, where);
+    else startMotion(port, where);
+    model.ports.push_back(std::move(port));
+  }
+
+  // Slaves on a line leave the rotation about it open; their own rotations decide it.
+  void resolveTurn(Port& port, const std::string& where) {
+    const Vec3 eigenvalue = armInertia(port.arm).selfadjointView<Eigen::Lower>().eigenvalues();
+    if (eigenvalue[0] * conditionRefused >= eigenvalue[2] && eigenvalue[2] > 0) return;
+    const bool turning = std::any_of(port.member.begin(), port.member.end(),
+                                     [&](int s) { return s < model.turningSlaves; });
+    if (!turning)
+      throw SceneError(where + (port.member.size() > 1 ? "its slaves are collinear and" : "its only slave") +
+                       " cannot turn, which leaves its rotation open; use formulation = \"optimized\" or "
+                       "rotations = true");
+    const double mean2 = 0.5 * eigenvalue.sum() / static_cast<double>(port.member.size());
+    port.turnWeight = mean2 > 0 ? mean2 : 1;
+    if (port.lever.isZero(0) || !model.finite()) return;
+    for (int s : port.member) {
+      SpringEnd end;
+      end.slave = s;
+      if (s < model.turningSlaves) orient(end);
+      port.orientation.push_back(end.orientation);
+    }
+  }
+
+  // The port's velocities at the start from those of its nodes, which must move as one body.
+  void startMotion(Port& port, const std::string& where) {
+    const std::size_t count = port.member.size();
+    Vec3 meanArm = Vec3::Zero(), meanVelocity = Vec3::Zero(), turn = Vec3::Zero();
+    double speed = 0;
+    for (std::size_t i = 0; i < count; ++i) {
+      meanArm += at(port.arm.data(), i) / static_cast<double>(count);
+      meanVelocity += at(model.nodeVelocity.data(), port.member[i]) / static_cast<double>(count);
+      speed = std::max(speed, at(model.nodeVelocity.data(), port.member[i]).norm());
+    }
+    std::vector<double> arm = port.arm;
+    for (std::size_t i = 0; i < count; ++i) {
+      at(arm.data(), i) -= meanArm;
+      turn += at(arm.data(), i).cross(at(model.nodeVelocity.data(), port.member[i]));
+    }
+    const int rotating = *std::min_element(port.member.begin(), port.member.end());
+    if (rotating < model.rotating()) port.spin = at(model.nodeSpin.data(), rotating);
+    else if (!turn.isZero(0)) port.spin = armInertia(arm).completeOrthogonalDecomposition().solve(turn);
+    port.velocity = meanVelocity - port.spin.cross(meanArm);
+    for (std::size_t i = 0; i < count; ++i) {
+      const int node = port.member[i];
+      const Vec3 v = port.velocity + port.spin.cross(at(port.arm.data(), i));
+      const bool turnsElse = node < model.rotating() && !(at(model.nodeSpin.data(), node) == port.spin);
+      if (turnsElse || !((v - at(model.nodeVelocity.data(), node)).norm() <= 1e-9 * speed))
+        throw SceneError(where + "node " + std::to_string(model.nodeId[node]) +
+                         ": its [[initial]] velocity does not fit a rigid motion of the port's nodes");
+    }
+  }
+
   // Without acceleration inputs the driven share of a consistent mass matrix has nothing to multiply.
   void adviseOnInertia() {
     if (scene.settings.inertia != Inertia::consistent || scene.settings.reaction != Reaction::loads) return;
@@ -506,14 +612,21 @@ bool Model::shareable() const {
   return std::any_of(groups.begin(), groups.end(), [](const TieGroup& g) { return g.partEnd.size() > 1; });
 }
 
+std::size_t Model::drivenPorts() const {
+  return static_cast<std::size_t>(std::count_if(ports.begin(), ports.end(), [](const Port& p) { return !p.ofSlaves; }));
+}
+
 bool Model::exposes(const char* name) const {
   return std::find(settings.expose.begin(), settings.expose.end(), name) != settings.expose.end();
 }
 
 bool Model::needsPositions() const {
-  if (!springs.empty() || exposes("slave.r") || exposes("master.r") || exposes("point.r")) return true;
+  if (!springs.empty() || exposes("slave.r") || exposes("master.r") || exposes("point.r") || exposes("port.r"))
+    return true;
   if (settings.position == Position::input && anyDriven()) return true;
   if (!finite()) return false;
+  for (const Port& port : ports)
+    if (port.ofSlaves && port.member.size() > 1) return true;
   return std::any_of(groups.begin(), groups.end(), [](const TieGroup& g) { return g.coupling == Coupling::meanMotion; });
 }
 

@@ -52,6 +52,22 @@ struct Spring {
   double length;  // rest length of an axial spring
 };
 
+// Nodes that the interface shows as one rigid body about a reference point.
+struct Port {
+  std::string name;
+  int number = 0;                // from 1 in the scene's order
+  std::uint8_t ofSlaves = 0;     // 1: of slaves, which it loads; 0: of driven nodes, which it moves
+  std::vector<int> member;       // indices of slaves, or of independent nodes
+  std::vector<double> arm;       // 3 per member, at the start: from the slaves' mean, or from the reference point, m
+  Vec3 place = Vec3::Zero();     // reference point at the start, m
+  Vec3 lever = Vec3::Zero();     // of slaves: from their mean to the reference point at the start, m
+  Vec3 velocity = Vec3::Zero();  // of driven nodes, at the start
+  Vec3 spin = Vec3::Zero();
+  // Slaves on a line: what the slaves' own rotations weigh beside their positions, m2. Else 0: they do not.
+  double turnWeight = 0;
+  std::vector<int> orientation;  // then, where there is a lever: per member its SpringEnd::orientation, or -1
+};
+
 struct Finding {  // one line of the tie report
   enum Kind { warning, note } kind;
   std::string text;
@@ -94,6 +110,8 @@ struct Model {
   std::vector<Spring> springs;
   std::vector<SpringEnd> oriented;         // ends whose rotation is tracked as a unit quaternion
 
+  std::vector<Port> ports;                 // those of driven nodes first
+
   // what the report says
   std::vector<std::string> tieName;
   std::vector<double> searchDistance;      // per tie: as given, or the default, m
@@ -111,6 +129,7 @@ struct Model {
   int turning() const { return turningSlaves; }
   bool anyFree() const { return free() > 0; }
   bool anyDriven() const;
+  std::size_t drivenPorts() const;
   bool isMaster(int group) const { return group % 2 == 0; }
   bool exposes(const char* name) const;  // is this name of INTERFACE's expose list asked for?
 

@@ -62,6 +62,14 @@ struct SceneSpring {
 };
 
 constexpr int mostThreads = 256;
+// Nodes that the interface shows as one rigid body: driven ones that it moves, or slaves that it loads.
+struct ScenePort {
+  std::string name;
+  std::vector<int> nodes;
+  bool listed = false;      // by ids: each must be part of the model; of a set those that are not are passed over
+  bool atMean = true;       // reference point: the mean of its nodes' positions, or `at`
+  Vec3 at = Vec3::Zero();   // m
+};
 
 struct Settings {
   Inertia inertia = Inertia::lumped;
@@ -81,6 +89,7 @@ struct Scene {
   SceneSegments segments;
   std::vector<SceneTie> ties;
   std::vector<SceneSpring> springs;
+  std::vector<ScenePort> ports;
   Settings settings;
 };
 

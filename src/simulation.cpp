@@ -42,6 +42,7 @@ struct Simulation::Impl {
   bool dampers = false, energy = false, integrates = false;
   // Derived from `data`, never saved: geometry, gathered loads and outputs behind the inputs.
   bool geometryOld = true, loadsOld = true, outputsOld = true, parametersOld = true;
+  bool portsOld = true;  // the ports' nodes
   bool prepared = false;
 
   explicit Impl(std::shared_ptr<const Model> m)
@@ -113,7 +114,13 @@ struct Simulation::Impl {
     }
   }
 
+  void bringPorts() {
+    if (portsOld && dynamics.ports.anyDriven()) dynamics.movePorts();
+    portsOld = false;
+  }
+
   void bringGeometry() {
+    bringPorts();
     if (!geometryOld) return;
     dynamics.updateGeometry();
     checkSegments();
@@ -130,6 +137,7 @@ struct Simulation::Impl {
       dynamics.evaluateReactions();
     }
     loadsOld = false;
+    checkPorts(0);
   }
 
   double totalEnergy() { return dynamics.kineticEnergy() + dynamics.strainEnergy(); }
@@ -187,6 +195,22 @@ struct Simulation::Impl {
     }
   }
 
+  // Ports of driven nodes after h more at the present velocities, and whether those of slaves still have a rotation.
+  void checkPorts(double h) {
+    if (model->ports.empty()) return;
+    char text[80];
+    std::snprintf(text, sizeof text, "diverged at t = %.9g s: ", time);
+    for (const auto& [place, rate] : {std::pair{Field::portPlace, Field::portVelocity},
+                                      std::pair{Field::portRotation, Field::portSpin}})
+      for (std::size_t k = 0; k < layout[rate].count; ++k) {
+        const double from = place == Field::portPlace ? field(place)[k] : 0;
+        if (std::abs(from + h * field(rate)[k]) < farAway) continue;  // false for NaN
+        throw Diverged(text + ("port '" + model->ports[k / 3].name) + "' leaves the world", layout[rate].offset + k);
+      }
+    const std::string flat = dynamics.ports.collapsed();
+    if (!flat.empty()) throw Diverged(text + ("the slaves of port '" + flat) + "' have come to lie on a line");
+  }
+
   void checkSegments() {
     if (!model->finite()) return;
     const std::string nodes = dynamics.collapsed();
@@ -210,7 +234,7 @@ struct Simulation::Impl {
     std::copy_n(backup.begin(), kept[0].count, data.begin() + kept[0].offset);
     std::copy_n(backup.begin() + kept[0].count, kept[1].count, data.begin() + kept[1].offset);
     flags &= ~accelerationsValid;
-    geometryOld = loadsOld = outputsOld = true;
+    geometryOld = loadsOld = outputsOld = portsOld = true;
   }
 
   // All nodes are driven: positions and rotations follow the velocities, and nothing is integrated else.
@@ -226,7 +250,7 @@ struct Simulation::Impl {
     dynamics.inputsOver(0, duration);
     if (dynamics.has(Field::position) && model->settings.position == Position::integrated) checkPlaces(duration);
     if (integrates) dynamics.drift(duration, 0);
-    dynamics.inputsAt(duration);
+    dynamics.inputsAt(0, duration);
     checkSegments();
     time += duration;
     if (!energy) return;
@@ -285,6 +309,7 @@ struct Simulation::Impl {
     time = end;
     checkFinite();
     if (dynamics.has(Field::position)) checkPlaces(0);
+    checkPorts(0);
     checkSegments();
     if (energy) field(Field::work)[3] = totalEnergy();
   }
@@ -303,7 +328,7 @@ double Simulation::integratorLimit() const { return impl_->methodLimit(); }
 
 void Simulation::inputsChanged() {
   impl_->flags &= ~accelerationsValid;
-  impl_->loadsOld = impl_->outputsOld = true;
+  impl_->loadsOld = impl_->outputsOld = impl_->portsOld = true;
   impl_->geometryOld = impl_->model->settings.position == Position::input || impl_->geometryOld;
   impl_->dynamics.takeDrivenVelocities();
 }
@@ -336,9 +361,15 @@ void Simulation::outputRates(double* rates) {
         for (std::size_t k = 0; k < s.layout[motion].count; ++k) {
           const int node = static_cast<int>(k / 3);
           const std::size_t place = s.layout[motion].offset + k;
-          if (node >= s.model->freeBegin() && node < s.model->freeEnd()) continue;
+          if ((node >= s.model->freeBegin() && node < s.model->freeEnd()) || s.dynamics.ports.moves(node)) continue;
           if (!s.dynamics.inputs.knows(place)) setInputDerivative(place, 1, s.field(rate)[k]);
         }
+    if (s.model->accelerationInputs())
+      for (const auto& [motion, rate] : {std::pair{Field::portVelocity, Field::portAcceleration},
+                                         std::pair{Field::portSpin, Field::portAngularAcceleration}})
+        for (std::size_t k = 0; k < s.layout[motion].count; ++k)
+          if (const std::size_t place = s.layout[motion].offset + k; !s.dynamics.inputs.knows(place))
+            setInputDerivative(place, 1, s.field(rate)[k]);
     // Two steps: what the outputs hold of an earlier step's half-step velocities is gone after the first.
     std::vector<InputDerivatives> inputs = s.dynamics.inputs.all();
     step(h);
@@ -365,12 +396,13 @@ void Simulation::reset() {
   s.time = 0;
   s.substeps = 0;
   s.flags = 0;
-  s.geometryOld = s.loadsOld = s.outputsOld = s.parametersOld = true;
+  s.geometryOld = s.loadsOld = s.outputsOld = s.parametersOld = s.portsOld = true;
 }
 
 void Simulation::initialise(double time) {
   Impl& s = *impl_;
   s.time = time;
+  s.bringPorts();
   s.dynamics.prepare();
   s.checkSegments();
   s.findLimits();
@@ -395,6 +427,7 @@ void Simulation::step(double duration) {
   };
   s.save();
   try {
+    s.checkPorts(duration);
     if (s.model->anyFree()) s.integrate(duration);
     else s.carry(duration);
     s.dynamics.inputs.clear();
@@ -411,6 +444,7 @@ void Simulation::step(double duration) {
 
 void Simulation::updateOutputs() {
   Impl& s = *impl_;
+  s.bringPorts();
   if (s.parametersOld) {  // during initialisation parameters may still change
     s.dynamics.prepare();
     s.findLimits();
@@ -450,7 +484,7 @@ void Simulation::restore(const State& state) {
   s.dynamics.inputs.assign(state.inputs, s.layout);
   if (!s.prepared || !sameMasses) s.dynamics.prepareMass();
   s.prepared = true;
-  s.geometryOld = s.loadsOld = s.outputsOld = true;
+  s.geometryOld = s.loadsOld = s.outputsOld = s.portsOld = true;
   s.parametersOld = !(s.flags & initialised);
 }
 

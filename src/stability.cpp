@@ -1,6 +1,5 @@
 #include "stability.hpp"
 
-
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <complex>
@@ -15,7 +14,7 @@ constexpr int maxVectors = 32, maxRestarts = 40;
 constexpr double tolerance = 1e-9;
 // Many unknowns: digits beyond these cost more than the time step gains; the bound takes up the difference.
 constexpr int manyUnknowns = 3000;
-constexpr double looseTolerance = 1e-5;
+constexpr double looseTolerance = 1e-4;
 constexpr double none = 1e30;
 
 // Spectral radius of one step of size h on x'' = -omega^2 x - c x'.
@@ -114,14 +113,17 @@ void Spectrum::apply(const double* x, double* y, bool damping) {
   std::copy_n(t_.begin() + first, turning, y + free);
 }
 
+// x = M^-1 p; x holds a guess on entry.
 void Spectrum::solve(const double* p, double* x) {
   const Model& model = dynamics_.model;
   const int first = 3 * model.freeBegin(), free = 3 * model.free(), turning = size_ - free;
   std::copy_n(p, free, f_.begin() + first);
   std::copy_n(p + free, turning, t_.begin() + first);
-  dynamics_.solveInertia(f_.data(), t_.data());
-  std::copy_n(f_.begin() + first, free, x);
-  std::copy_n(t_.begin() + first, turning, x + free);
+  std::copy_n(x, free, u_.begin() + first);
+  std::copy_n(x + free, turning, turn_.begin() + first);
+  dynamics_.solveInertia(f_.data(), t_.data(), u_.data(), turn_.data());
+  std::copy_n(u_.begin() + first, free, x);
+  std::copy_n(turn_.begin() + first, turning, x + free);
 }
 
 Spectrum::Value Spectrum::lanczos(bool damping, double* mode, int vectors) {
@@ -131,6 +133,7 @@ Spectrum::Value Spectrum::lanczos(bool damping, double* mode, int vectors) {
   const auto mv = [&](int j) { return Vector(image_.data() + static_cast<std::ptrdiff_t>(size_) * j, size_); };
   Small tridiagonal = Small::Zero(vectors, vectors);
   mv(0) = Vector(mode, size_);
+  v(0).setZero();
   solve(mv(0).data(), v(0).data());
   double norm = std::sqrt(std::max(0.0, v(0).dot(mv(0))));
   if (!(norm > 0)) return {};
@@ -142,6 +145,7 @@ Spectrum::Value Spectrum::lanczos(bool damping, double* mode, int vectors) {
     const int j = used++;
     auto p = mv(j + 1), x = v(j + 1);
     apply(v(j).data(), p.data(), damping);
+    x.setZero();
     solve(p.data(), x.data());
     tridiagonal(j, j) = v(j).dot(p);
     // Full reorthogonalisation; in the second sweep on an x made anew of p, as cancellation has parted the two.

@@ -25,7 +25,7 @@ class Spectrum {
     double residual = 0;  // |lambda - ritz| <= residual for an eigenvalue lambda, the largest one once converged
     double bound() const { return ritz + residual; }
   };
-  // Until the residual is below 1e-9 of the value (1e-5 with over 3000 unknowns), or 40 restarts. Writes M x of the
+  // Until the residual is below 1e-9 of the value (1e-4 with over 3000 unknowns), or 40 restarts. Writes M x of the
   // mode to `mode` (if not null).
   Value largest(bool damping, double* mode);
   // A few Lanczos vectors started from `mode`, which is updated. No allocation.

@@ -215,6 +215,7 @@ def test_wrong_sets(abaqus_scene, tie, line):
     ("*ELEMENT, TYPE=S3, ELSET=right", "*ELEMENT, TYPE=S6, ELSET=right",
      "element type S6 is quadratic; segments need three or four nodes"),
     (" 901, 902, 1", " 901, 903, 1", "set 'welds': node 903 is not in the file"),
+    (" 901, 902, 1", " 901, 902, 1, 1", "set 'welds': GENERATE takes first, last and step, found '901, 902, 1, 1'"),
     (" 7, 10, 20, 30, 40", " 7, 10, 20, 30", "element 7 has 3 nodes, its type has 4"),
     (" 7, 10, 20, 30, 40", " 7, 10, 20, 30, 41", "segment 7: node 41 is not in the mesh (ids 10..902)"),
     (" 60, 0.2, 0.1, 0.", " 60, 0.2, x, 0.", "*NODE: cannot be read (could not convert string to float: ' x')"),

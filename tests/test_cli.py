@@ -12,7 +12,7 @@ import pytest
 
 import tiefmu
 from conftest import toml
-from tiefmu import cli
+from tiefmu import cli, package
 from tiefmu.cli import main
 
 
@@ -42,6 +42,21 @@ def test_build_names_the_fmu_after_the_scene(weld, scene_file, capsys, tmp_path)
     assert zipfile.is_zipfile("weld.fmu")
     assert main(["build", name, "-o", "other.fmu"]) == 0
     assert (tmp_path / "other.fmu").read_bytes() == (tmp_path / "weld.fmu").read_bytes()
+
+
+def test_build_of_many_variables_names_ports_as_the_cure(weld, scene_file, capsys):
+    def said_with(slaves):
+        ids = list(range(101, 101 + slaves))
+        weld["mesh"]["nodes"][4:] = [[i, 0.1 * k / slaves, 0.05, 0.0] for k, i in enumerate(ids)]
+        weld["tie"][0]["slaves"] = ids
+        assert main(["build", scene_file(weld)]) == 0
+        return capsys.readouterr()
+    said = said_with(1662)  # 6 variables a slave, 7 a master
+    assert ", 10000 variables, " in said.out and "ports" not in said.err
+    said = said_with(1663)
+    assert ", 10006 variables, " in said.out
+    [line] = [line for line in said.err.splitlines() if "variables" in line]
+    assert line.startswith("warning: weld.toml: interface: 10006 variables") and "'ports' in [interface]" in line
 
 
 def test_info_of_a_scene_and_of_its_fmu_are_the_same(weld, scene_file, capsys):
@@ -157,9 +172,9 @@ def test_wrong_files(weld, scene_file, capsys, tmp_path, arguments, line):
         archive.writestr("modelDescription.xml", "<fmiModelDescription/>")
     with zipfile.ZipFile(tmp_path / "list.fmu", "w") as archive:
         archive.writestr("resources/report.json", "[]")
-    model = tiefmu.load(weld).model
+    xml = package.contents(tiefmu.load(weld))["modelDescription.xml"]
     with zipfile.ZipFile(tmp_path / "damaged.fmu", "w") as archive:
-        archive.writestr("modelDescription.xml", model.xml("weld", "", "{guid}"))
+        archive.writestr("modelDescription.xml", xml)
         archive.writestr("resources/report.json", '{"slaves": []}')
     (tmp_path / "damaged.fmu").write_bytes((tmp_path / "damaged.fmu").read_bytes().replace(b'{"slaves', b'{"salves'))
     before = sorted(tmp_path.rglob("*"))

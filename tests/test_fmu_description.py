@@ -240,6 +240,23 @@ def test_a_row_of_thousands_of_dependencies_is_left_out(tmp_path):
     assert len(rows["slave[7].v[2]"]) == 12
 
 
+def test_a_long_row_of_nearly_all_inputs_is_left_out(tmp_path):
+    """Every slave's load reaches every master of the only segment."""
+    def rows(slaves):
+        outputs = Fmu(quad(slaves=slaves, rotations=False, formulation="optimized"), tmp_path).description.outputs
+        return [row.dependencies for row in outputs if row.variable.name.startswith("master")]
+    assert [len(row) for row in rows(160)] == 12 * [960]  # of 972
+    assert rows(170) == 12 * [None]
+
+
+def test_kinds_are_left_out_where_all_are_dependent(tmp_path):
+    def kinds(**model):
+        scene = quad(rotations=False, formulation="optimized", model=model)
+        return [row.dependenciesKind for row in Fmu(scene, tmp_path).description.outputs if row.dependencies]
+    assert kinds() and not any(kinds())
+    assert all(kinds(geometry="small"))
+
+
 def test_default_experiment(tmp_path):
     def experiment(scene):
         fmu = Fmu(scene, tmp_path)

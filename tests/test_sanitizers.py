@@ -14,6 +14,7 @@ import pytest
 
 import tiefmu
 from fmu_scenes import ALL_FREE, DRIVEN, MIXED, SETTINGS, scene
+from port_scenes import ported
 
 ROOT = Path(__file__).resolve().parents[1]
 SEQUENCES = int(os.environ.get("TIEFMU_SEQUENCES", 2000))
@@ -34,18 +35,23 @@ def program(preset: str) -> Path:
     return ROOT / "build" / preset / "tiefmu_calls"
 
 
-def packed(folder: Path, settings: tuple) -> Path:
+def packed(folder: Path, made: dict) -> Path:
     """A packed scene, as the FMU finds it."""
     folder.mkdir()
-    model = tiefmu.load(scene(np.random.default_rng(1), *settings)).model
+    model = tiefmu.load(made).model
     (folder / "scene.bin").write_bytes(model.resource(f"{{{folder.name}}}"))
     return folder
 
 
 @pytest.fixture
 def folders(tmp_path) -> list[Path]:
-    return [packed(tmp_path / name, settings)
-            for name, settings in (("mixed", MIXED), ("free", ALL_FREE), ("driven", DRIVEN))]
+    return [*(packed(tmp_path / name, scene(np.random.default_rng(1), *settings))
+              for name, settings in (("mixed", MIXED), ("free", ALL_FREE), ("driven", DRIVEN))), ports(tmp_path)]
+
+
+def ports(folder: Path) -> Path:
+    settings = ("default", True, "consistent", "split", "finite")
+    return packed(folder / "ports", ported(np.random.default_rng(1), settings, motions="mixed"))
 
 
 def run(program: Path, *arguments) -> str:
@@ -62,7 +68,8 @@ def test_addresses_and_undefined_behaviour(folders, tmp_path):
     run(calls, "states", *folders)
     run(calls, "failures", *folders)
     run(calls, "leaks", 1000, *folders)
-    scenes = [packed(tmp_path / str(number), settings) for number, settings in enumerate(SETTINGS)]
+    scenes = [packed(tmp_path / str(number), scene(np.random.default_rng(1), *settings))
+              for number, settings in enumerate(SETTINGS)] + [folders[-1]]
     table = list(csv.DictReader(run(calls, "sequences", SEQUENCES, 1, *scenes).splitlines()))
     assert len(table) == 40
     for row in table:  # sequences that get nowhere would prove nothing

@@ -192,6 +192,31 @@ CASES = {
     "expose nothing known": (("interface", "expose"), ["slave.x"], "interface: expose: unknown name 'slave.x'; known: "
                              "energy, power_residual, drift, master.r, master.stiffness, slave.r, slave.a, "
                              "slave.mass, slave.inertia, point.r"),
+    "port of a set that is not there": (("interface", "ports"), ["flange"], "interface: port 'flange': the mesh has no "
+                                        "set 'flange'; it has no sets of nodes: give ids or 'all'"),
+    "port of a node that is not there": (("interface", "ports"), [{"name": "a", "nodes": [7]}],
+                                         f"interface: port 'a': node 7 {NOT_FOUND}"),
+    "port without nodes": (("interface", "ports"), [{"name": "a", "nodes": []}],
+                           "interface: ports: entry 1: nodes: the list is empty; give at least one id"),
+    "port named twice": (("interface", "ports"), [{"name": "a", "nodes": [1]}, {"name": "a", "nodes": [2]}],
+                         "interface: port 'a': this name is repeated"),
+    "node in two ports": (("interface", "ports"), [{"name": "a", "nodes": [1, 2]}, {"name": "b", "nodes": [3, 2]}],
+                          "interface: port 'b': node 2: is already in port 'a'; a node can be in one port only"),
+    "port of slaves and masters": (("interface", "ports"), [{"name": "a", "nodes": [1, 101]}], "interface: port 'a': "
+                                   "holds slaves (node 101) and nodes that are none (node 1); make two ports of them"),
+    "port of all": (("interface", "ports"), ["all"], "interface: port 'all': holds slaves (node 101) and nodes that "
+                    "are none (node 4); make two ports of them"),
+    "port of a slave that cannot turn": (("interface", "ports"), [{"name": "a", "nodes": [101]}],
+                                         "interface: port 'a': its only slave cannot turn, which leaves its rotation "
+                                         "open; use formulation = \"optimized\" or rotations = true"),
+    "unknown key of a port": (("interface", "ports"), [{"name": "a", "node": [1]}],
+                              "interface: ports: entry 1: unknown key 'node'; did you mean 'nodes'?"),
+    "port without a name": (("interface", "ports"), [{"nodes": [1]}], "interface: ports: entry 1: name: is missing"),
+    "port with a bracket in its name": (("interface", "ports"), ["a[1]"],
+                                        "interface: ports: entry 1: 'a[1]' cannot name a port: letters, digits, spaces "
+                                        "and _ - . : / can; give the set as nodes, with another name"),
+    "port with an odd place": (("interface", "ports"), [{"name": "a", "nodes": [1], "at": [0, 0]}],
+                               "interface: ports: entry 1: at: expected [x, y, z], found [0, 0]"),
     "expose a number": (("interface", "expose"), [3], "interface: expose: entry 1: expected a text, found 3"),
     # mesh file
     "no such mesh file": (("mesh", "file"), "panel.inp", "mesh: file: panel.inp: no such file"),
@@ -239,6 +264,16 @@ TABLE = [(value, f"expected a table, found {shown}") for value, shown in
          ((5, "5"), ("x", "'x'"), (True, "true"), ([1], "[1]"))]
 LIST = [(value, f"expected a list, found {shown}") for value, shown in
         ((5, "5"), ("x", "'x'"), (True, "true"), ({}, "a table"))]
+PORT = "expected the name of a set, or a table {name, nodes, at}"
+PORTS = LIST + [([value], f"entry 1: {line}") for value, line in (
+    (3, f"{PORT}, found 3"), (["a"], f"{PORT}, found ['a']"), (True, f"{PORT}, found true"), ({}, "name: is missing"),
+    ("", "'' cannot name a port: letters, digits, spaces and _ - . : / can; give the set as nodes, with another name"),
+    ({"name": 5}, "name: expected a text, found 5"),
+    ({"name": " a"}, "' a' cannot name a port: letters, digits, spaces and _ - . : / can"),
+    ({"name": "a\n"}, "'a\\n' cannot name a port: letters, digits, spaces and _ - . : / can"),
+    ({"name": "a", "nodes": 5}, "nodes: expected a list of ids, a set name or 'all', found 5"),
+    ({"name": "a", "nodes": [1.5]}, f"nodes: {IDS}, found 1.5"),
+    ({"name": "a", "at": [0, 0, NAN]}, "at: nan is not a finite number"))]
 NAMES = LIST + [([3], "entry 1: expected a text, found 3"), ([["v"]], "entry 1: expected a text, found ['v']")]
 
 
@@ -297,6 +332,7 @@ KEYS = {
     ("interface",): TABLE,
     ("interface", "expose"): NAMES,
     ("interface", "hide"): NAMES,
+    ("interface", "ports"): PORTS,
 }
 
 
@@ -324,6 +360,26 @@ def test_wrong_value(path, weld):
 
 def escaped(name: str) -> str:
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in name)
+
+
+def test_ports_of_what_they_cannot_move(weld):
+    weld["node"].append({"nodes": [3], "motion": "free"})
+    weld["node"].append({"nodes": [4], "motion": "fixed"})
+    weld["mesh"]["nodes"].append([9, 1.0, 0.0, 0.0])
+    for node, line in ((3, "is free; a port moves driven nodes or loads slaves"),
+                       (4, "is fixed; a port moves driven nodes or loads slaves"), (9, "no tie and no spring uses it")):
+        weld["interface"] = {"ports": [{"name": "a", "nodes": [1, node]}]}
+        with pytest.raises(tiefmu.SceneError) as error:
+            tiefmu.load(weld)
+        assert str(error.value) == f"scene: interface: port 'a': node {node}: {line}"
+
+
+def test_ports_need_integrated_positions(weld):
+    weld |= {"interface": {"ports": [{"name": "a", "nodes": [1]}]}, "model": {"position": "input"}}
+    with pytest.raises(tiefmu.SceneError) as error:
+        tiefmu.load(weld)
+    assert str(error.value) == ("scene: interface: ports: need position = 'integrated' in [model]: a port's nodes move "
+                                "with the port")
 
 
 # --------------------------------------------------------------------------------------------------------------- meshes

@@ -148,6 +148,17 @@ void addSprings(Scene& scene, const std::string& name, const Indices& a, const I
   }
 }
 
+void addPort(Scene& scene, const std::string& name, const Indices& nodes, bool listed, const Doubles& reference) {
+  require(reference.shape(0) == 0 || reference.shape(0) == 3, "add_port: at has no or three numbers");
+  ScenePort port;
+  port.name = name;
+  port.nodes = indices(nodes, scene.nodes.id.size(), 0, "add_port: nodes");
+  port.listed = listed;
+  port.atMean = reference.shape(0) == 0;
+  if (!port.atMean) port.at = at(reference.data(), 0);
+  scene.ports.push_back(std::move(port));
+}
+
 void setSettings(Scene& scene, const std::string& inertia, const std::string& reaction, const std::string& geometry,
                  const std::string& position, const std::array<double, 3>& gravity, const std::string& method,
                  double timeStep, double safety, int threads, const std::vector<std::string>& expose,
@@ -173,7 +184,7 @@ void setSettings(Scene& scene, const std::string& inertia, const std::string& re
 // ---- Model
 
 std::shared_ptr<Model> compileScene(const Scene& scene) {
-  checkInterface(scene.settings);
+  checkInterface(scene);
   return std::make_shared<Model>(compile(scene));
 }
 
@@ -262,6 +273,23 @@ nb::dict reportNodes(const Model& model) {
   return d;
 }
 
+nb::list reportPorts(const Model& model) {
+  nb::list result;
+  for (const Port& port : model.ports) {
+    std::vector<std::int64_t> ids;
+    const std::vector<std::int64_t>& all = port.ofSlaves ? model.slaveId : model.nodeId;
+    for (int k : port.member) ids.push_back(all[static_cast<std::size_t>(k)]);
+    nb::dict d;
+    d["name"] = port.name;
+    d["number"] = port.number;
+    d["of_slaves"] = port.ofSlaves != 0;
+    d["ids"] = numpy(std::move(ids));
+    d["at"] = std::vector<double>(port.place.begin(), port.place.end());
+    result.append(d);
+  }
+  return result;
+}
+
 nb::dict report(const Model& model) {
   nb::list warnings, notes, dropped;
   for (const Finding& f : model.findings) (f.kind == Finding::warning ? warnings : notes).append(f.text);
@@ -272,6 +300,7 @@ nb::dict report(const Model& model) {
   d["couplings"] = std::vector<std::string>(std::begin(couplingNames), std::end(couplingNames));
   d["search_distance"] = model.searchDistance;
   d["springs"] = model.springs.size();
+  d["ports"] = reportPorts(model);
   d["dropped"] = dropped;
   d["left_out"] = numpy(model.leftOut);
   d["warnings"] = warnings;
@@ -310,6 +339,18 @@ constexpr FieldName fieldNames[] = {
     {Field::offset, "offset", 3},
     {Field::segmentRotation, "segment_rotation", 4},
     {Field::orientation, "orientation", 4},
+    {Field::portForce, "port_force", 3},
+    {Field::portMoment, "port_moment", 3},
+    {Field::portVelocity, "port_velocity", 3},
+    {Field::portSpin, "port_spin", 3},
+    {Field::portAcceleration, "port_acceleration", 3},
+    {Field::portAngularAcceleration, "port_angular_acceleration", 3},
+    {Field::portPlace, "port_place", 3},
+    {Field::portRotation, "port_rotation", 4},
+    {Field::portReaction, "port_reaction", 3},
+    {Field::portReactionMoment, "port_reaction_moment", 3},
+    {Field::portMeanVelocity, "port_mean_velocity", 3},
+    {Field::portMeanSpin, "port_mean_spin", 3},
     {Field::slaveVelocity, "slave_velocity", 3},
     {Field::slaveSpin, "slave_spin", 3},
     {Field::reactionForce, "reaction_force", 3},
@@ -386,6 +427,7 @@ class Run {
       d["description"] = b.description;
       d["numbers"] = numpy(b.numbers);
       d["ids"] = numpy(b.ids);
+      d["labels"] = b.labels;
       d["reference"] = b.reference;
       result.append(d);
     }
@@ -447,6 +489,9 @@ NB_MODULE(_core, m) {
       .def("add_springs", &addSprings, "name"_a, "a"_a, "b"_a, "kind"_a, "stiffness"_a, "damping"_a,
            "rotational_stiffness"_a, "rotational_damping"_a,
            "One spring for each pair of a and b (int32 node indices; b = -1: ground), all of the same kind.")
+      .def("add_port", &addPort, "name"_a, "nodes"_a, "listed"_a, "at"_a,
+           "nodes: int32 indices; listed: by ids, so that each must be part of the model; at: [x, y, z], or empty for "
+           "the mean of the nodes' positions.")
       .def("set_settings", &setSettings, nb::kw_only(), "inertia"_a = "lumped", "reaction"_a = "loads",
            "geometry"_a = "finite", "position"_a = "integrated", "gravity"_a = std::array<double, 3>{},
            "method"_a = "central-difference", "time_step"_a = 0.0, "safety"_a = 0.9, "threads"_a = 1,
@@ -456,22 +501,21 @@ NB_MODULE(_core, m) {
   nb::class_<Model>(m, "Model", "A scene searched, checked and sorted. Constant.")
       .def(nb::new_(&compileScene), "scene"_a, "Raises SceneError.")
       .def("report", &report, "What there is to tell: arrays over slaves and nodes in the model's order, findings.")
-      .def("xml",
-           [](const Model& model, const std::string& name, const std::string& title, const std::string& guid) {
-             Description d;
-             d.name = name;
-             d.title = title;
-             d.guid = guid;
-             const std::string text = xml(model, d);
-             return nb::bytes(text.data(), text.size());
-           },
-           "name"_a, "title"_a, "guid"_a, "modelDescription.xml of the FMU, as bytes.")
       .def("resource",
            [](const Model& model, const std::string& guid) {
              const std::string bytes = writeResource(model, guid);
              return nb::bytes(bytes.data(), bytes.size());
            },
            "guid"_a, "resources/scene.bin of the FMU, as bytes.");
+  nb::class_<Xml>(m, "Description", "modelDescription.xml of a model's FMU. Analysed once.")
+      .def(nb::init<const Model&, std::string, std::string>(), nb::keep_alive<1, 2>(), "model"_a, "name"_a, "title"_a,
+           "name: of the scene; title: free text. Raises SceneError where the model cannot start.")
+      .def("write",
+           [](const Xml& description, const std::string& guid, nb::callable sink) {
+             description.write(guid, [&](std::string_view text) { sink(nb::bytes(text.data(), text.size())); });
+           },
+           "guid"_a, "sink"_a, "Calls sink(bytes) with the text, piece by piece.")
+      .def_prop_ro("step_size", &Xml::stepSize, "Of the default experiment, s.");
   m.def("model_identifier", &modelIdentifier, "name"_a, "The C identifier that an FMU of this name uses.");
 
   nb::class_<Simulation::State>(m, "State", "A saved state; only for `restore` of a simulation of the same model.")

@@ -92,6 +92,8 @@ class InputFile:
             items = [item.strip() for item in line.split(",") if item.strip()]
             if "GENERATE" in options:
                 first, last, *step = map(whole, items)
+                if len(step) > 1:
+                    raise SceneError(f"set '{name}': GENERATE takes first, last and step, found '{line}'")
                 if last - first > MOST:
                     raise SceneError(f"set '{name}': {first} to {last} is more than a file can hold")
                 members.extend(range(first, last + 1, *step))

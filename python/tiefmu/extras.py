@@ -11,13 +11,13 @@ from .scene import Scene
 LICENSES = Path(__file__).parent / "licenses"
 
 
-def extras(scene: Scene, found: dict, xml: bytes) -> dict[str, bytes]:
-    """Path in the archive -> bytes. found: the scene's report; xml: its model description."""
-    picture = Picture(scene.model.report()["nodes"], found)
+def extras(scene: Scene, found: dict, step: float) -> dict[str, bytes]:
+    """Path in the archive -> bytes. found: the scene's report; step: of the default experiment, s."""
+    picture = Picture(scene.model.report())
     files = {
         "documentation/index.html": page(scene, found, picture),
         "model.png": picture.png(),
         "terminalsAndIcons/terminalsAndIcons.xml": terminals(scene),
     }
     files |= {f"documentation/licenses/{path.name}": path.read_bytes() for path in LICENSES.glob("*.txt")}
-    return files | reference(scene, xml)
+    return files | reference(scene, step)

@@ -3,7 +3,7 @@
 from html import escape
 
 from .extras_picture import Picture
-from .report import step, summary
+from .report import counted, step, summary
 from .scene import Scene
 
 SHOWN = 200        # rows of a table; resources/report.json has all
@@ -25,6 +25,14 @@ barycentre C.</li>
 <li>Outputs belong to the inputs last set: a get after a set at the same time sees the new inputs.</li>
 </ul>"""
 
+PORTS = """<li><code>port[name]</code> of driven nodes: velocity <code>v</code> of the reference point and angular
+velocity <code>w</code> move the nodes as one rigid body; <code>f</code>, <code>t</code> is the resultant of what ties
+and springs do to them, about the reference point where it is now.</li>
+<li><code>port[name]</code> of slaves: <code>f</code>, <code>t</code> is spread over the slaves with that resultant;
+<code>v</code>, <code>w</code> is their mean rigid motion. f&middot;v + t&middot;w is the power of the slaves'
+loads.</li>
+"""
+
 REACTIONS = {
     "loads": "The reaction is the slaves' load alone: the host carries a driven master's own mass and "
              "<code>added_mass</code> (and inertia).",
@@ -37,7 +45,7 @@ REACTIONS = {
 
 def page(scene: Scene, found: dict, picture: Picture) -> bytes:
     """found: the scene's report."""
-    title = escape(scene.title or scene.name)
+    title, ports = escape(scene.title or scene.name), found.get("ports", [])
     small = len(picture.segments) + len(found["slaves"]) <= MOST_DRAWN
     parts = [f'<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8"><title>{title}</title>'
              f"<style>{STYLE}</style></head><body>\n<h1>{title}</h1>\n",
@@ -57,6 +65,13 @@ def page(scene: Scene, found: dict, picture: Picture) -> bytes:
                    [[row["number"], row["id"], row["motion"], "yes" if row["rotations"] else "no", row["mass"],
                      row["added_mass"], row["added_inertia"]] for row in found["masters"][:SHOWN]],
                    len(found["masters"])),
+             table("Ports: nodes that the interface shows as one rigid body. Added: what the tie adds to a port of "
+                   "driven nodes, with the centre of that mass and its moments and products of inertia about it (xx, "
+                   "yy, zz, yz, zx, xy), at the start.",
+                   ["port", "nodes", "reference point [m]", "added mass [kg]", "centre [m]", "inertia [kg m2]"],
+                   [[row["name"], counted(len(row["nodes"]), "slave" if row["moves"] == "slaves" else "driven node"),
+                     numbers(row["at"]), row.get("added_mass", ""), numbers(row.get("added_centre", [])),
+                     numbers(row.get("added_inertia", []))] for row in ports[:SHOWN]], len(ports)),
              CONVENTIONS, "<h2>Settings</h2><ul>\n"]
     settings = scene.settings
     parts += [f"<li>{REACTIONS[settings.reaction]}</li>\n",
@@ -66,6 +81,8 @@ def page(scene: Scene, found: dict, picture: Picture) -> bytes:
         parts.append(f"<li>Stable step: {step(found['stable_time_step'])}, nodal step: "
                      f"{step(found['nodal_time_step'])}. A communication step is divided into as many substeps as the "
                      "limit asks.</li>\n")
+    if ports:
+        parts.append(PORTS)
     parts.append("</ul>\n")
     for key in ("warnings", "notes"):
         if found[key]:
@@ -73,6 +90,10 @@ def page(scene: Scene, found: dict, picture: Picture) -> bytes:
                          + "".join(f"<li>{escape(line)}</li>" for line in found[key][:SHOWN]) + "</ul>\n")
     parts.append('<p><a href="licenses/license.txt">Licences</a></p>\n</body></html>\n')
     return "".join(parts).encode()
+
+
+def numbers(values: list[float]) -> str:
+    return " ".join(f"{value:.5g}" for value in values)
 
 
 def table(caption: str, header: list[str], rows: list[list], total: int | None = None) -> str:

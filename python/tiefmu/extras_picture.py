@@ -16,20 +16,27 @@ COLOURS = ["#ffffff", FACE, EDGE, SLAVE]
 
 
 class Picture:
-    """nodes: those of Model.report(); found: the scene's report."""
+    """found: that of Model.report()."""
 
-    def __init__(self, nodes: dict, found: dict):
-        position = dict(zip(nodes["id"].tolist(), nodes["position"]))
-        self.labels = [row["id"] for row in found["masters"]]
-        corners = {row["segment"]: row["nodes"] for row in found["slaves"]}
-        shape = [np.array([position[i] for i in ids]) for ids in corners.values()]
-        masters = np.array([position[i] for i in self.labels]).reshape(-1, 3)
+    def __init__(self, found: dict):
+        nodes, slaves = found["nodes"], found["slaves"]
+        by_id = np.argsort(nodes["id"], kind="stable")
+        # Places of each slave's corners; a triangle's fourth has no weight.
+        corner = np.arange(4) < slaves["corners"][:, None]
+        index = np.where(corner, np.searchsorted(nodes["id"][by_id], slaves["nodes"]), 0)
+        places = nodes["position"][by_id][index] if len(index) else np.zeros((0, 4, 3))
         # S = P + d, or C + d: the weights are those of the tie.
-        feet, offsets = np.zeros((len(found["slaves"]), 3)), np.zeros((len(found["slaves"]), 3))
-        for j, row in enumerate(found["slaves"]):
-            feet[j] = np.asarray(row["weights"]) @ [position[i] for i in row["nodes"]]
-            offsets[j] = row["offset"]
-        self.slave_labels = [row["id"] for row in found["slaves"]]
+        mean = slaves["coupling"] == found["couplings"].index("meanMotion")
+        weights = np.where(mean[:, None], corner / slaves["corners"][:, None], slaves["weights"])
+        order = np.argsort(slaves["id"], kind="stable")
+        feet = np.einsum("ji,jik->jk", weights, places)[order]
+        offsets = slaves["offset"][order]
+        masters = by_id[nodes["master"][by_id].astype(bool)]
+        self.labels = nodes["id"][masters].tolist()
+        self.slave_labels = slaves["id"][order].tolist()
+        first = order[np.sort(np.unique(slaves["segment"][order], return_index=True)[1])]  # a slave of each segment
+        shape = [corners[:n] for corners, n in zip(places[first], slaves["corners"][first].tolist())]
+        masters = nodes["position"][masters]
         project = projection(np.vstack([masters, feet + offsets]))
         self.segments = [project(points) for points in shape]
         self.masters, self.feet, self.slaves = project(masters), project(feet), project(feet + offsets)

@@ -1,6 +1,7 @@
 """Packing a scene as an FMU. The same scene and the same binary give the same bytes."""
 
 import hashlib
+import io
 import json
 import os
 import sys
@@ -40,23 +41,28 @@ def build(scene: Scene, path) -> Path:
 
 def contents(scene: Scene) -> dict[str, bytes]:
     """Path in the archive -> bytes."""
-    identifier = _core.model_identifier(scene.name)
-    xml = scene.model.xml(scene.name, scene.title, "")
-    guid = model_guid(scene, xml)
-    found = report(scene)
-    return {
-        # put in by hand, because large models take a while to describe twice
-        "modelDescription.xml": xml.replace(b'guid=""', f'guid="{guid}"'.encode(), 1),
-        f"binaries/{PLATFORM}/{identifier}{SUFFIX}": binary(),
+    # The text of a large model comes last: by then the report's lists are gone, which are as large.
+    description = _core.Description(scene.model, scene.name, scene.title)
+    files = from_report(scene, description.step_size)
+    guid = model_guid(scene, description)
+    xml = io.BytesIO()
+    description.write(guid, xml.write)
+    return files | {
+        "modelDescription.xml": xml.getvalue(),
+        f"binaries/{PLATFORM}/{_core.model_identifier(scene.name)}{SUFFIX}": binary(),
         "resources/scene.bin": scene.model.resource(guid),
-        "resources/report.json": json.dumps(found, allow_nan=False).encode(),
-    } | extras(scene, found, xml)
+    }
 
 
-def model_guid(scene: Scene, xml: bytes) -> str:
-    """Changes with everything the FMU's user could notice, and with nothing else. xml: with an empty guid."""
+def from_report(scene: Scene, step: float) -> dict[str, bytes]:
+    found = report(scene)
+    return {"resources/report.json": json.dumps(found, allow_nan=False).encode()} | extras(scene, found, step)
+
+
+def model_guid(scene: Scene, description: _core.Description) -> str:
+    """Changes with everything the FMU's user could notice, and with nothing else."""
     digest = hashlib.sha256(version("tiefmu").encode())
-    digest.update(xml)
+    description.write("", digest.update)
     digest.update(scene.model.resource(""))
     return f"{{{uuid.UUID(bytes=digest.digest()[:16])}}}"
 

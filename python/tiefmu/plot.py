@@ -7,7 +7,7 @@ import numpy as np
 
 LINES = 8   # most in a panel: those that move most
 PANELS = 8  # most in a picture, in this order
-ORDER = ["slave", "master", "point", "energy", "power_residual", "drift"]
+ORDER = ["port", "slave", "master", "point", "energy", "power_residual", "drift"]
 
 
 def plot(result: np.ndarray, path: Path, title: str):
@@ -21,7 +21,7 @@ def plot(result: np.ndarray, path: Path, title: str):
     panels = {}
     for name in result.dtype.names:
         if re.split(r"[.\[]", name)[0] in ORDER:
-            quantity = "energy" if name.startswith("energy.") else re.sub(r"\[\d+\]", "", name)
+            quantity = "energy" if name.startswith("energy.") else re.sub(r"\[[^]]*\]", "", name)
             panels.setdefault(quantity, []).append(name)
     shown = sorted(panels.items(), key=lambda panel: ORDER.index(panel[0].split(".")[0]))[:PANELS]
     figure, axes = plt.subplots(max(len(shown), 1), 1, sharex=True, squeeze=False,

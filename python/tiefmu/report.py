@@ -9,6 +9,7 @@ import numpy as np
 from .scene import MOTIONS, Scene
 from ._core import SceneError
 
+MANY_VARIABLES = 10_000  # importers read them in seconds, masters connect them in minutes
 SHOWN = 20  # slaves, masters, points and ids that the text shows; the dict has all
 
 
@@ -23,6 +24,8 @@ def report(scene: Scene) -> dict:
     found = scene.model.report()
     slaves, nodes = found["slaves"], found["nodes"]
     by_id = np.argsort(slaves["id"], kind="stable")
+    ports = {"ports": port_rows(scene, found)} if found["ports"] else {}
+    variables = variable_counts(scene)
     return {
         "title": scene.title,
         "ties": ties(scene, found),
@@ -33,14 +36,14 @@ def report(scene: Scene) -> dict:
         "dropped": [{"id": number, "tie": scene.ties[tie].name, "reason": reason}
                     for number, tie, reason in found["dropped"]],
         "left_out": found["left_out"].tolist(),
-        "warnings": found["warnings"],
+        "warnings": found["warnings"] + size_warning(sum(variables.values())),
         "notes": [*scene.notes, *found["notes"]],
         "stable_time_step": scene.start.get("stable_time_step").tolist()[0],
         "nodal_time_step": scene.start.get("nodal_time_step").tolist()[0],
         "integrator_limit": scene.start.integrator_limit,
         "freedoms": freedoms(scene, nodes),
-        "variables": variable_counts(scene),
-    }
+        "variables": variables,
+    } | ports
 
 
 def ties(scene: Scene, found: dict) -> list[dict]:
@@ -109,6 +112,31 @@ def node_rows(scene: Scene, nodes: dict, master: bool) -> list[dict]:
     return rows
 
 
+def port_rows(scene: Scene, found: dict) -> list[dict]:
+    """One row a port, in the scene's order. Of driven nodes also what the tie adds to them, as one body: its mass, the
+    centre of that mass and the moments and products of inertia about it (xx, yy, zz, yz, zx, xy), at the start."""
+    nodes, rows = found["nodes"], []
+    added_mass, added_inertia = scene.start.get("added_mass"), scene.start.get("added_inertia")
+    index = dict(zip(nodes["id"].tolist(), range(len(nodes["id"]))))
+    for port in sorted(found["ports"], key=lambda port: port["number"]):
+        ids = np.sort(port["ids"])
+        row = {"name": port["name"], "moves": "slaves" if port["of_slaves"] else "driven nodes", "at": port["at"],
+               "nodes": ids.tolist()}
+        if not port["of_slaves"]:
+            own = np.array([index[i] for i in ids.tolist()])
+            mass, position = added_mass[own], nodes["position"][own]
+            total = float(mass.sum())
+            centre = mass @ position / total if total > 0 else np.array(port["at"])
+            arm = position - centre
+            tensor = np.einsum("n,nij->ij", mass, (arm**2).sum(axis=1)[:, None, None] * np.eye(3)
+                               - arm[:, :, None] * arm[:, None, :])
+            tensor += added_inertia[own[own < nodes["rotating"]]].sum() * np.eye(3)
+            row |= {"added_mass": total, "added_centre": centre.tolist(),
+                    "added_inertia": [float(tensor[i, j]) for i, j in ((0, 0), (1, 1), (2, 2), (1, 2), (2, 0), (0, 1))]}
+        rows.append(row)
+    return rows
+
+
 def nodal_step(mass: float, stiffness: float) -> float:
     """Seed (3): sqrt(2 m/K); 1e30 where nothing limits it."""
     return (2 * mass / stiffness)**0.5 if stiffness > 0 else 1e30
@@ -130,6 +158,13 @@ def variable_counts(scene: Scene) -> dict:
     for block in scene.start.variables:
         counts[block["name"]] = counts.get(block["name"], 0) + len(block["numbers"]) * block["components"]
     return counts
+
+
+def size_warning(variables: int) -> list[str]:
+    if variables <= MANY_VARIABLES:
+        return []
+    return [f"interface: {variables} variables; many importers and masters take minutes over more than {MANY_VARIABLES}; "
+            "'ports' in [interface] makes the nodes of a set one rigid port of 12 variables"]
 
 
 def of_fmu(path: Path) -> dict:
@@ -161,6 +196,7 @@ def text(name: str, found: dict) -> str:
     lines += ["", *slave_text(found["slaves"])]
     lines += node_text("master", found["masters"])
     lines += node_text("point", found["points"])
+    lines += port_text(found.get("ports", []))
     lines += ["steps", f"  stable  {step(found['stable_time_step'])}   2/omega_max of the assembled system",
               f"  nodal   {step(found['nodal_time_step'])}   smallest sqrt(2 m/K) of the free nodes",
               f"  method  {step(found['integrator_limit'])}   limit of the chosen integrator", ""]
@@ -204,9 +240,20 @@ def node_text(what: str, nodes: list[dict]) -> list[str]:
     return [*lines, *more(nodes, what + "s"), ""]
 
 
+def port_text(ports: list[dict]) -> list[str]:
+    lines = []
+    for row in ports[:SHOWN]:
+        what = "slave" if row["moves"] == "slaves" else "driven node"
+        added = f", added mass {row['added_mass']:.5g} kg" if "added_mass" in row else ""
+        lines.append(f"port '{row['name']}': {counted(len(row['nodes']), what)} about "
+                     f"[{', '.join(f'{x:.6g}' for x in row['at'])}] m{added}")
+    return [*lines, *more(ports, "ports"), ""] if ports else []
+
+
 def summary(found: dict) -> str:
     """How much of everything, in one line."""
-    return ", ".join([*(counted(len(found[f"{what}s"]), what) for what in ("tie", "slave", "master", "point")),
+    whats = ["tie", "slave", "master", "point"] + (["port"] if "ports" in found else [])
+    return ", ".join([*(counted(len(found[f"{what}s"]), what) for what in whats),
                       counted(found["springs"], "spring"), counted(sum(found["variables"].values()), "variable")])
 
 

@@ -117,6 +117,7 @@ class Assembly:
             self.apply_node_table(f"node table {number}", number, table)
         self.ties = self.resolve_ties()
         self.springs = self.resolve_springs()
+        self.ports = self.resolve_ports()
         for number, table in enumerate(tables.initial, 1):
             self.apply_initial(f"initial {number}", table)
 
@@ -172,6 +173,24 @@ class Assembly:
                 springs.append((a, np.full(len(a), -1)))
         return springs
 
+    def resolve_ports(self) -> list[np.ndarray]:
+        """Nodes of each port."""
+        ports, names, owner = [], set(), np.full(len(self.mesh.node_id), -1)
+        for number, port in enumerate(self.tables.interface.ports):
+            where = f"interface: port '{port['name']}'"
+            if port["name"] in names:
+                raise SceneError(f"{where}: this name is repeated")
+            names.add(port["name"])
+            nodes = self.nodes(where, port["nodes"])
+            twice = nodes[owner[nodes] >= 0]
+            if len(twice):
+                other = self.tables.interface.ports[owner[twice[0]]]["name"]
+                raise SceneError(f"{where}: node {self.mesh.node_id[twice[0]]}: is already in port '{other}'; a node "
+                                 "can be in one port only")
+            owner[nodes] = number
+            ports.append(nodes)
+        return ports
+
     def apply_initial(self, where: str, table: schema.Initial):
         nodes = self.nodes(f"{where}: nodes", table.nodes)
         slave = np.zeros(len(self.motion), bool)
@@ -210,6 +229,9 @@ class Assembly:
             scene.add_springs(f"spring {number}", a.astype(np.int32), b.astype(np.int32), table.kind,
                               *(np.broadcast_to(si(key, getattr(table, key)), 3).copy() for key in
                                 ("stiffness", "damping", "rotational_stiffness", "rotational_damping")))
+        for port, nodes in zip(self.tables.interface.ports, self.ports):
+            place = np.empty(0) if port["at"] is None else si("position", port["at"])
+            scene.add_port(port["name"], nodes.astype(np.int32), isinstance(port["nodes"], list), place)
         model, integrator, interface = self.tables.model, self.tables.integrator, self.tables.interface
         scene.set_settings(inertia=model.inertia, reaction=model.reaction, geometry=model.geometry,
                            position=model.position, gravity=si("gravity", model.gravity), method=integrator.method,

@@ -4,6 +4,7 @@ Only what one table shows by itself is checked here. References between tables a
 """
 
 import difflib
+import re
 import sys
 from typing import Annotated, Any, Literal
 
@@ -113,6 +114,36 @@ def vector(value: Any) -> list[float]:
     return [finite(number) for number in value]
 
 
+PORT_NAME = re.compile(r"[\w.:/ -]+")
+
+
+def port(value: Any) -> dict:
+    """The name of a set, or a table {name, nodes, at}; as a table with all three."""
+    keys = ["name", "nodes", "at"]
+    if isinstance(value, dict):
+        unknown = next((key for key in value if key not in keys), None)
+        if unknown is not None:
+            raise wrong(f"unknown key '{unknown}'{suggestion(str(unknown), keys)}")
+    elif not isinstance(value, str):
+        raise wrong(f"expected the name of a set, or a table {{name, nodes, at}}, found {found(value)}")
+    table = {"name": value} if isinstance(value, str) else value
+    name = table.get("name")
+    if not isinstance(name, str):
+        raise wrong("name: is missing" if name is None else f"name: expected a text, found {found(name)}")
+    if not PORT_NAME.fullmatch(name) or name != name.strip():
+        cure = "; give the set as nodes, with another name" if isinstance(value, str) else ""
+        raise wrong(f"{found(name)} cannot name a port: letters, digits, spaces and _ - . : / can{cure}")
+    return {"name": name, "nodes": keyed("nodes", selection, table.get("nodes", name)),
+            "at": keyed("at", vector, table["at"]) if "at" in table else None}
+
+
+def keyed(key: str, check, value: Any) -> Any:
+    try:
+        return check(value)
+    except PydanticCustomError as error:
+        raise wrong(f"{key}: {error.message()}") from None
+
+
 def two_nodes(value: Any) -> list[int]:
     if not isinstance(value, list) or len(value) != 2:
         raise wrong(f"expected two node ids, found {found(value)}")
@@ -129,6 +160,7 @@ NotNegativeVector = Annotated[Any, PlainValidator(number_or_vector)]
 Vector = Annotated[Any, PlainValidator(vector)]
 TwoNodes = Annotated[Any, PlainValidator(two_nodes)]
 Selection = Annotated[Any, PlainValidator(selection)]
+Port = Annotated[Any, PlainValidator(port)]
 
 
 class Table(BaseModel):
@@ -223,6 +255,7 @@ class Integrator(Table):
 class Interface(Table):
     expose: list[str] = []
     hide: list[str] = []
+    ports: list[Port] = []
 
 
 class SceneTables(Table):

@@ -16,6 +16,7 @@ sys.path.insert(0, str(HERE.parent))
 import tiefmu  # noqa: E402
 from fmu_calls import OK, Fmu, Instance  # noqa: E402
 from fmu_scenes import SETTINGS, scene  # noqa: E402
+from port_scenes import ported  # noqa: E402
 
 SMALL = {
     "mesh": {"nodes": [[1, 0, 0, 0], [2, 1, 0, 0], [3, 1, 1, 0], [4, 0, 1, 0], [101, 0.3, 0.6, 0.2]],
@@ -42,6 +43,8 @@ def main():
     for number in (0, 3, 9, 16):
         model = tiefmu.load(scene(np.random.default_rng(number), *SETTINGS[number])).model
         (resources / f"many_sided_{number}.bin").write_bytes(model.resource("{fuzz}"))
+    made = ported(np.random.default_rng(1), ("default", True, "consistent", "split", "finite"), motions="mixed")
+    (resources / "ports.bin").write_bytes(tiefmu.load(made).model.resource("{fuzz}"))
     (resources / "small.bin").write_bytes(tiefmu.load(SMALL).model.resource("{fuzz}"))
     with tempfile.TemporaryDirectory() as folder:
         fmu = Fmu(SMALL, Path(folder))

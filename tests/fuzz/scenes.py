@@ -21,6 +21,7 @@ import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
 import tiefmu
+from tiefmu import package
 
 CORPUS = Path(__file__).resolve().parent / "corpus" / "scene"
 SCENES = sorted(CORPUS.glob("*.toml"))
@@ -85,7 +86,7 @@ def check(path: Path):
     """Raises unless the scene is loaded, or refused properly."""
     try:
         scene = tiefmu.load(path)
-        xml = scene.model.xml(scene.name, scene.title, "{guid}")
+        xml = package.contents(scene)["modelDescription.xml"]
         json.dumps(tiefmu.report(scene), allow_nan=False)
     except tiefmu.SceneError as error:
         line = str(error)

@@ -48,6 +48,9 @@ class Source:
         self.file, self.name, self.folder = str(path), Path(path).stem, Path(path).parent
         try:
             self.tables = schema.parse(read_toml(Path(path)))
+            if self.tables.interface.ports:
+                raise SceneError("interface: ports: advice and studies move and load the nodes one by one; leave the ports "
+                                 "out of the scene they look at")
         except SceneError as error:
             raise SceneError(f"{self.file}: {error}") from None
         self.scene = self.compile(self.tables)  # as it is: what is wrong with it shows here

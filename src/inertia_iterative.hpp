@@ -1,0 +1,15 @@
+// The consistent mass matrix of many free nodes, solved by conjugate gradients.
+#pragma once
+
+#include <memory>
+
+#include "inertia.hpp"
+
+namespace tiefmu {
+
+// A system of any size with memory linear in it. Preconditioned by a symmetric Gauss-Seidel sweep over the nodes, whose
+// six freedoms are solved together: the slaves' offsets couple a node's rotation with its translation firmly, but one
+// node with the next as loosely as in any finite element mass matrix.
+std::unique_ptr<ConsistentInertia> iterativeInertia(const Model& model);
+
+}  // namespace tiefmu

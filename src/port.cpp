@@ -1,0 +1,255 @@
+#include "port.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+
+#include "segment.hpp"
+
+namespace tiefmu {
+namespace {
+
+// The rotation R with the largest trace of R^T H, by the eigenvector of Horn's matrix (Horn 1987): for H = sum x x0^T
+// the one that turns the x0 closest to the x.
+Mat3 closestRotation(const Mat3& h) {
+  const Vec3 axis(h(2, 1) - h(1, 2), h(0, 2) - h(2, 0), h(1, 0) - h(0, 1));
+  Eigen::Matrix4d horn;
+  horn(0, 0) = h.trace();
+  horn.block<3, 1>(1, 0) = axis;
+  horn.block<1, 3>(0, 1) = axis.transpose();
+  horn.block<3, 3>(1, 1) = h + h.transpose() - h.trace() * Mat3::Identity();
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix4d> solver(horn);
+  const Eigen::Vector4d q = solver.eigenvectors().col(3);
+  return Quat(q[0], q[1], q[2], q[3]).toRotationMatrix();
+}
+
+}  // namespace
+
+Mat3 armInertia(const std::vector<double>& arm) {
+  Mat3 sum = Mat3::Zero();
+  for (std::size_t i = 0; 3 * i < arm.size(); ++i) {
+    const Vec3 r = at(arm.data(), i);
+    sum += r.squaredNorm() * Mat3::Identity() - r * r.transpose();
+  }
+  return sum;
+}
+
+Ports::Ports(const Model& model, const Layout& layout, double* data)
+    : model_(model), layout_(layout), data_(data), driven_(model.drivenPorts()) {
+  if (driven_ > 0) moved_.resize(static_cast<std::size_t>(model.nodes()));
+  for (const Port& port : model.ports) {
+    if (!port.ofSlaves) {
+      for (int node : port.member) moved_[node] = 1;
+      continue;
+    }
+    Shape s;
+    s.arm = port.arm;
+    s.lever = port.lever;
+    if (port.turnWeight > 0)
+      s.turning = static_cast<int>(std::count_if(port.member.begin(), port.member.end(),
+                                                 [&](int slave) { return slave < model.turning(); }));
+    shapes_.push_back(std::move(s));
+    setShape(shapes_.size() - 1, nullptr);
+  }
+}
+
+// J^-1, and the lever, from the arms as they are: turned as they have turned since the start.
+void Ports::setShape(std::size_t k, const Mat3* turned) {
+  const Port& port = slavePort(k);
+  Shape& s = shapes_[k];
+  s.inverse = inverseSymmetric(armInertia(s.arm) + s.turning * port.turnWeight * Mat3::Identity());
+  if (!turned || port.lever.isZero(0)) return;
+  Mat3 h = *turned;
+  for (std::size_t i = 0; i < port.member.size(); ++i)
+    h += at(s.arm.data(), i) * at(port.arm.data(), i).transpose();
+  s.lever = closestRotation(h) * port.lever;
+}
+
+void Ports::setStart() {
+  for (std::size_t p = 0; p < driven_; ++p) {
+    at(field(Field::portPlace), p) = model_.ports[p].place;
+    at(field(Field::portVelocity), p) = model_.ports[p].velocity;
+    at(field(Field::portSpin), p) = model_.ports[p].spin;
+    if (model_.finite()) field(Field::portRotation)[4 * p] = 1;
+  }
+}
+
+Mat3 Ports::rotation(std::size_t p) const {
+  if (!model_.finite()) return Mat3::Identity();
+  const double* q = field(Field::portRotation) + 4 * p;
+  return Quat(q[0], q[1], q[2], q[3]).toRotationMatrix();
+}
+
+void Ports::move() {
+  const bool accelerations = model_.accelerationInputs();
+  for (std::size_t p = 0; p < driven_; ++p) {
+    const Port& port = model_.ports[p];
+    const Mat3 turned = rotation(p);
+    const Vec3 v = at(field(Field::portVelocity), p), w = at(field(Field::portSpin), p);
+    for (std::size_t i = 0; i < port.member.size(); ++i) {
+      const int node = port.member[i];
+      at(field(Field::velocity), node) = v + w.cross(turned * at(port.arm.data(), i));
+      if (node < model_.rotating()) at(field(Field::spin), node) = w;
+    }
+    if (!accelerations) continue;
+    const Vec3 a = at(field(Field::portAcceleration), p), z = at(field(Field::portAngularAcceleration), p);
+    for (std::size_t i = 0; i < port.member.size(); ++i) {
+      const int node = port.member[i];
+      const Vec3 r = turned * at(port.arm.data(), i);
+      at(field(Field::acceleration), node) = a + z.cross(r);
+      if (model_.finite()) at(field(Field::acceleration), node) += w.cross(w.cross(r));
+      if (node < model_.rotating()) at(field(Field::angularAcceleration), node) = z;
+    }
+  }
+}
+
+// The rotation vector of a w(t) that moves is h w_mean - h^2/12 w(tau) x w(tau + h) to fourth order (Magnus 1954), and
+// h w exactly where w stands.
+Ports::Motion Ports::motion(const InputCurve& inputs, std::size_t p, double tau, double h) const {
+  const std::size_t v = layout_[Field::portVelocity].offset + 3 * p, w = layout_[Field::portSpin].offset + 3 * p;
+  if (!inputs.active()) return {h * at(data_ + v, 0), h * at(data_ + w, 0)};
+  const Vec3 before = inputs.at(w, tau, data_), after = inputs.at(w, tau + h, data_);
+  return {h * inputs.mean(v, tau, h, data_), h * inputs.mean(w, tau, h, data_) - h * h / 12 * before.cross(after)};
+}
+
+void Ports::carry(const InputCurve& inputs, double tau, double h) {
+  for (std::size_t p = 0; p < driven_; ++p) {
+    const Port& port = model_.ports[p];
+    const auto [shift, turn] = motion(inputs, p, tau, h);
+    const Mat3 turned = rotation(p);
+    const Quat q = exponential(turn);
+    const Vec3 axis = q.vec(), spin = turn / h, velocity = shift / h;
+    for (std::size_t i = 0; i < port.member.size(); ++i) {
+      const int node = port.member[i];
+      const Vec3 r = turned * at(port.arm.data(), i);
+      Vec3 travel = spin.cross(r);
+      if (model_.finite()) {  // (exp(turn) - 1) r / h
+        const Vec3 across = axis.cross(r);
+        travel = 2 / h * (q.w() * across + axis.cross(across));
+      }
+      at(field(Field::velocity), node) = velocity + travel;
+      if (node < model_.rotating()) at(field(Field::spin), node) = spin;
+    }
+  }
+}
+
+void Ports::advance(const InputCurve& inputs, double tau, double h) {
+  for (std::size_t p = 0; p < driven_; ++p) {
+    const auto [shift, turn] = motion(inputs, p, tau, h);
+    at(field(Field::portPlace), p) += shift;
+    if (!model_.finite()) continue;
+    turnQuaternion(field(Field::portRotation) + 4 * p, turn);
+    if (layout_[Field::position].count == 0) continue;
+    const Port& port = model_.ports[p];
+    const Mat3 turned = rotation(p);
+    const Vec3 place = at(field(Field::portPlace), p);
+    for (std::size_t i = 0; i < port.member.size(); ++i)
+      at(field(Field::position), port.member[i]) = place + turned * at(port.arm.data(), i);
+  }
+  move();
+}
+
+void Ports::moveChange(double* dot) const {
+  const auto change = [&](Field f) { return dot + layout_[f].offset; };
+  for (std::size_t p = 0; p < driven_; ++p) {
+    const Port& port = model_.ports[p];
+    const Mat3 turned = rotation(p);
+    const Vec3 w = at(field(Field::portSpin), p);
+    const Vec3 dv = at(change(Field::portVelocity), p), dw = at(change(Field::portSpin), p);
+    Vec3 da = Vec3::Zero(), dz = Vec3::Zero();
+    if (model_.accelerationInputs()) {
+      da = at(change(Field::portAcceleration), p);
+      dz = at(change(Field::portAngularAcceleration), p);
+    }
+    for (std::size_t i = 0; i < port.member.size(); ++i) {
+      const int node = port.member[i];
+      const Vec3 r = turned * at(port.arm.data(), i);
+      at(change(Field::velocity), node) = dv + dw.cross(r);
+      if (node < model_.rotating()) at(change(Field::spin), node) = dw;
+      if (!model_.accelerationInputs()) continue;
+      at(change(Field::acceleration), node) = da + dz.cross(r);
+      if (model_.finite()) at(change(Field::acceleration), node) += dw.cross(w.cross(r)) + w.cross(dw.cross(r));
+      if (node < model_.rotating()) at(change(Field::angularAcceleration), node) = dz;
+    }
+  }
+}
+
+void Ports::gather(const double* f, const double* t, double* force, double* moment) const {
+  for (std::size_t p = 0; p < driven_; ++p) {
+    const Port& port = model_.ports[p];
+    const Mat3 turned = rotation(p);
+    Vec3 sum = Vec3::Zero(), turning = Vec3::Zero();
+    for (std::size_t i = 0; i < port.member.size(); ++i) {
+      const int node = port.member[i];
+      const Vec3 load = at(f, node);
+      sum += load;
+      turning += (turned * at(port.arm.data(), i)).cross(load);
+      if (node < model_.rotating()) turning += at(t, node);
+    }
+    at(force, p) += sum;
+    at(moment, p) += turning;
+  }
+}
+
+std::string Ports::collapsed() const {
+  for (std::size_t k = 0; k < shapes_.size(); ++k)
+    if (!std::isfinite(shapes_[k].inverse.sum())) return slavePort(k).name;
+  return {};
+}
+
+void Ports::spread(const double* force, const double* moment, double* fs, double* ms) const {
+  for (std::size_t k = 0; k < shapes_.size(); ++k) {
+    const Port& port = slavePort(k);
+    const Shape& s = shapes_[k];
+    const Vec3 f = at(force, k), share = f / static_cast<double>(port.member.size());
+    const Vec3 a = s.inverse * (Vec3(at(moment, k)) + s.lever.cross(f));
+    for (std::size_t i = 0; i < port.member.size(); ++i) {
+      const int slave = port.member[i];
+      at(fs, slave) += share + a.cross(at(s.arm.data(), i));
+      if (s.turning > 0 && slave < model_.turning()) at(ms, slave) += port.turnWeight * a;
+    }
+  }
+}
+
+Ports::Twist Ports::meanMotion(std::size_t k, const double* vs, const double* ws) const {
+  const Port& port = slavePort(k);
+  const Shape& s = shapes_[k];
+  Vec3 v = Vec3::Zero(), turn = Vec3::Zero();
+  for (std::size_t i = 0; i < port.member.size(); ++i) {
+    const int slave = port.member[i];
+    v += at(vs, slave);
+    turn += at(s.arm.data(), i).cross(at(vs, slave));
+    if (s.turning > 0 && slave < model_.turning()) turn += port.turnWeight * at(ws, slave);
+  }
+  const Vec3 w = s.inverse * turn;
+  return {v / static_cast<double>(port.member.size()) + w.cross(s.lever), w};
+}
+
+void Ports::mean(const double* vs, const double* ws, double* velocity, double* spin) const {
+  for (std::size_t k = 0; k < shapes_.size(); ++k) {
+    const Twist twist = meanMotion(k, vs, ws);
+    at(velocity, k) = twist.velocity;
+    at(spin, k) = twist.spin;
+  }
+}
+
+double Ports::power(const double* vs, const double* ws) const {
+  double sum = 0;
+  for (std::size_t k = 0; k < shapes_.size(); ++k) {
+    const Twist twist = meanMotion(k, vs, ws);
+    sum += at(field(Field::portForce), k).dot(twist.velocity) + at(field(Field::portMoment), k).dot(twist.spin);
+  }
+  return sum;
+}
+
+void Ports::places(const double* xs, double* x) const {
+  for (std::size_t p = 0; p < driven_; ++p) at(x, p) = at(field(Field::portPlace), p);
+  for (std::size_t k = 0; k < shapes_.size(); ++k) {
+    const Port& port = slavePort(k);
+    Vec3 centre = Vec3::Zero();
+    for (int slave : port.member) centre += at(xs, slave);
+    at(x, driven_ + k) = centre / static_cast<double>(port.member.size()) + shapes_[k].lever;
+  }
+}
+
+}  // namespace tiefmu
