@@ -81,25 +81,30 @@ Mat3 Ports::rotation(std::size_t p) const {
 }
 
 void Ports::move() {
+  for (std::size_t p = 0; p < driven_; ++p) moveNodes(p, false);
+}
+
+void Ports::moveNodes(std::size_t p, bool places) {
+  const Port& port = model_.ports[p];
+  const Mat3 turned = rotation(p);
   const bool accelerations = model_.accelerationInputs();
-  for (std::size_t p = 0; p < driven_; ++p) {
-    const Port& port = model_.ports[p];
-    const Mat3 turned = rotation(p);
-    const Vec3 v = at(field(Field::portVelocity), p), w = at(field(Field::portSpin), p);
-    for (std::size_t i = 0; i < port.member.size(); ++i) {
-      const int node = port.member[i];
-      at(field(Field::velocity), node) = v + w.cross(turned * at(port.arm.data(), i));
-      if (node < model_.rotating()) at(field(Field::spin), node) = w;
-    }
-    if (!accelerations) continue;
-    const Vec3 a = at(field(Field::portAcceleration), p), z = at(field(Field::portAngularAcceleration), p);
-    for (std::size_t i = 0; i < port.member.size(); ++i) {
-      const int node = port.member[i];
-      const Vec3 r = turned * at(port.arm.data(), i);
-      at(field(Field::acceleration), node) = a + z.cross(r);
-      if (model_.finite()) at(field(Field::acceleration), node) += w.cross(w.cross(r));
-      if (node < model_.rotating()) at(field(Field::angularAcceleration), node) = z;
-    }
+  const Vec3 v = at(field(Field::portVelocity), p), w = at(field(Field::portSpin), p);
+  const Vec3 place = at(field(Field::portPlace), p);
+  Vec3 a = Vec3::Zero(), z = Vec3::Zero();
+  if (accelerations) {
+    a = at(field(Field::portAcceleration), p);
+    z = at(field(Field::portAngularAcceleration), p);
+  }
+  for (std::size_t i = 0; i < port.member.size(); ++i) {
+    const int node = port.member[i];
+    const Vec3 r = turned * at(port.arm.data(), i), across = w.cross(r);
+    if (places) at(field(Field::position), node) = place + r;
+    at(field(Field::velocity), node) = v + across;
+    if (accelerations)
+      at(field(Field::acceleration), node) = a + z.cross(r) + (model_.finite() ? w.cross(across) : Vec3(0, 0, 0));
+    if (node >= model_.rotating()) continue;
+    at(field(Field::spin), node) = w;
+    if (accelerations) at(field(Field::angularAcceleration), node) = z;
   }
 }
 
@@ -137,16 +142,9 @@ void Ports::advance(const InputCurve& inputs, double tau, double h) {
   for (std::size_t p = 0; p < driven_; ++p) {
     const auto [shift, turn] = motion(inputs, p, tau, h);
     at(field(Field::portPlace), p) += shift;
-    if (!model_.finite()) continue;
-    turnQuaternion(field(Field::portRotation) + 4 * p, turn);
-    if (layout_[Field::position].count == 0) continue;
-    const Port& port = model_.ports[p];
-    const Mat3 turned = rotation(p);
-    const Vec3 place = at(field(Field::portPlace), p);
-    for (std::size_t i = 0; i < port.member.size(); ++i)
-      at(field(Field::position), port.member[i]) = place + turned * at(port.arm.data(), i);
+    if (model_.finite()) turnQuaternion(field(Field::portRotation) + 4 * p, turn);
+    moveNodes(p, model_.finite() && layout_[Field::position].count > 0);
   }
-  move();
 }
 
 void Ports::moveChange(double* dot) const {

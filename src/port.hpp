@@ -66,6 +66,7 @@ class Ports {
   const Port& slavePort(std::size_t k) const { return model_.ports[driven_ + k]; }
   Motion motion(const InputCurve& inputs, std::size_t port, double tau, double h) const;
   Mat3 rotation(std::size_t port) const;
+  void moveNodes(std::size_t port, bool places);
   double* field(Field f) const { return data_ + layout_[f].offset; }
   void setShape(std::size_t k, const Mat3* turned);
   Twist meanMotion(std::size_t k, const double* vs, const double* ws) const;
