@@ -6,7 +6,6 @@ import sys
 import pytest
 
 
-
 @pytest.fixture
 def weld() -> dict:
     """The scene of the interface page: one quad, one slave off its plane, driven masters."""
@@ -51,3 +50,8 @@ def command(tmp_path):
         return subprocess.run([sys.executable, "-m", "tiefmu.cli", *map(str, arguments)], cwd=tmp_path,
                               capture_output=True, text=True)
     return run
+
+
+def pytest_collection_modifyitems(items):
+    """First what takes minutes in one test: the other processes have work meanwhile."""
+    items.sort(key=lambda item: item.path.stem != "test_sanitizers")
