@@ -10,8 +10,8 @@
 namespace tiefmu {
 namespace {
 
-// Below this many unknowns (3-vectors) a fresh factor at every geometry is cheaper than conjugate gradients.
-constexpr int smallSystem = 96;
+// Up to this many unknowns (3-vectors) a fresh factor at every geometry costs little, and is exact to rounding.
+constexpr int smallSystem = 40;
 
 // Calls body(group, segment, slave (global), local slave) in order.
 template <class Body>
