@@ -232,7 +232,7 @@ void checkSettings(const Settings& s) {
   requireEnum(s.geometry, Geometry::small, "geometry");
   requireEnum(s.position, Position::input, "position");
   requireEnum(s.method, Method::rk4, "method");
-  require(s.threads >= 1 && s.threads <= mostThreads, "threads");
+  require(s.threads >= 0 && s.threads <= mostThreads, "threads");
   require(s.gravity.allFinite() && std::isfinite(s.timeStep) && std::isfinite(s.safety), "settings");
 }
 

@@ -248,7 +248,7 @@ void addScalars(Table& table, const Model& model) {
     table.scalar("integrator.time_step", Field::timeStep, Causality::parameter);
     table.scalar("integrator.safety", Field::safety, Causality::parameter);
   }
-  if (model.shareable() || model.settings.threads > 1)
+  if (model.settings.threads > 0)
     table.scalar("integrator.threads", Field::threads, Causality::parameter);
   if (model.anyFree()) {
     table.scalar("stable_time_step", Field::stableTimeStep, Causality::output);

@@ -107,7 +107,7 @@ void Dynamics::setStart() {
   std::fill(data, data + layout.size, 0.0);
   *field(Field::timeStep) = model.settings.timeStep;
   *field(Field::safety) = model.settings.safety;
-  *field(Field::threads) = model.settings.threads;
+  *field(Field::threads) = std::max(1, model.settings.threads);
   workers_.reset();
   fill(field(Field::slaveMass), layout[Field::slaveMass].count, model.slaveMass);
   fill(field(Field::slaveInertia), layout[Field::slaveInertia].count, model.slaveInertia);

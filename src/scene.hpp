@@ -80,7 +80,7 @@ struct Settings {
   Method method = Method::centralDifference;
   double timeStep = 0;          // s; 0: safety * limit
   double safety = 0.9;
-  int threads = 1;              // from 1 to mostThreads
+  int threads = 0;              // from 1 to mostThreads; 0: one, and no parameter of the FMU
   std::vector<std::string> expose, hide;  // names of INTERFACE's last two tables
 };
 

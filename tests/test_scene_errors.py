@@ -243,6 +243,10 @@ FINITE = [("1", "expected a number, found '1'"), (True, "expected a number, foun
           (10**400, f"1{'0' * 36}... is too large; it must be at most 1e+30")]
 NUMBER = FINITE + [(-1e-3, "-0.001 is negative; it must be 0 or more")]
 POSITIVE = FINITE + [(0, "0 is too small; it must be more than 0"), (-1, "-1 is too small; it must be more than 0")]
+THREADS = [(0, "0 is too small; it must be at least 1"), (-3, "-3 is too small; it must be at least 1"),
+           (257, "257 is too large; it must be at most 256"), (10**9, "1000000000 is too large; it must be at most 256"),
+           (2.5, "expected a whole number, found 2.5"), (True, "expected a whole number, found true"),
+           ("two", "expected a whole number, found 'two'"), ([2], "expected a whole number, found [2]")]
 VECTOR = [(value, f"expected [x, y, z], found {shown}") for value, shown in
           ((1.0, "1.0"), ("x", "'x'"), ([], "[]"), ([1, 2], "[1, 2]"), ([1, 2, 3, 4], "[1, 2, 3, 4]"),
            ([1, 2, True], "[1, 2, true]"), ({}, "a table"))] + \
@@ -329,6 +333,7 @@ KEYS = {
     ("integrator", "method"): one_of("central-difference", "symplectic-euler", "noh-bathe", "rk4"),
     ("integrator", "time_step"): NUMBER,
     ("integrator", "safety"): POSITIVE,
+    ("integrator", "threads"): THREADS,
     ("interface",): TABLE,
     ("interface", "expose"): NAMES,
     ("interface", "hide"): NAMES,

@@ -10,7 +10,6 @@ import pytest
 import tiefmu
 from fmu_scenes import SETTINGS, scene
 from tiefmu._core import kernels
-from tiefmu.cli import main
 
 
 def panel(formulation: str, rotations: bool, motion: str, side: int = 64, shuffled: bool = False, **tables) -> dict:
@@ -176,13 +175,3 @@ def test_numbers_of_threads_that_make_no_sense(tmp_path, threads):
         fmpy.simulate_fmu(str(tmp_path / "panel.fmu"), stop_time=0.01, start_values={"integrator.threads": threads},
                           logger=lambda *a: said.append(a[-1].decode() if isinstance(a[-1], bytes) else str(a[-1])))
     assert any(f"integrator.threads is {threads:.6g}; it must be a whole number from 1 to 256" in line for line in said), said
-
-
-@pytest.mark.parametrize("threads, line", [
-    (0, "0 is too small; it must be at least 1"), (-3, "-3 is too small; it must be at least 1"),
-    (10**9, "1000000000 is too large; it must be at most 256"), (2.5, "expected a whole number, found 2.5"),
-    (True, "expected a whole number, found true"), ("two", "expected a whole number, found 'two'")])
-def test_bad_numbers_of_threads_in_a_scene(scene_file, weld, capsys, threads, line):
-    weld["integrator"] = {"threads": threads}
-    assert main(["build", scene_file(weld)]) == 2
-    assert capsys.readouterr().err == f"error: weld.toml: integrator: threads: {line}\n"

@@ -494,7 +494,7 @@ NB_MODULE(_core, m) {
            "the mean of the nodes' positions.")
       .def("set_settings", &setSettings, nb::kw_only(), "inertia"_a = "lumped", "reaction"_a = "loads",
            "geometry"_a = "finite", "position"_a = "integrated", "gravity"_a = std::array<double, 3>{},
-           "method"_a = "central-difference", "time_step"_a = 0.0, "safety"_a = 0.9, "threads"_a = 1,
+           "method"_a = "central-difference", "time_step"_a = 0.0, "safety"_a = 0.9, "threads"_a = 0,
            "expose"_a = std::vector<std::string>(), "hide"_a = std::vector<std::string>(),
            "The tables [model], [integrator] and [interface].");
 

@@ -311,7 +311,7 @@ def written(source, advice: Advice, options) -> str:
         raw["model"]["reaction"] = c.reaction
     if not c.driven:
         per = source.units.si("time_step", 1.0)
-        raw["integrator"] = {"method": c.method, "time_step": float(c.step / per), "safety": SAFETY}
+        raw.setdefault("integrator", {}).update(method=c.method, time_step=float(c.step / per), safety=SAFETY)
     if "file" in raw["mesh"]:
         mesh = (source.folder / raw["mesh"]["file"]).resolve()
         raw["mesh"]["file"] = Path(os.path.relpath(mesh, options.write.resolve().parent)).as_posix()

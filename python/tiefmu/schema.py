@@ -249,7 +249,7 @@ class Integrator(Table):
     method: Literal["central-difference", "symplectic-euler", "noh-bathe", "rk4"] = "central-difference"
     time_step: NotNegative = 0.0
     safety: Positive = 0.9
-    threads: Annotated[int, Field(ge=1, le=256)] = 1
+    threads: Annotated[int, Field(ge=1, le=256)] = 0  # not given: one, and no parameter of the FMU
 
 
 class Interface(Table):
