@@ -61,7 +61,8 @@ $(VENV)/installed: $(VENV)/built-with $(SOURCES)
 tools: $(TOOLS)
 
 valgrind:
-	@command -v valgrind >/dev/null || { echo "valgrind is missing: apt-get install valgrind"; exit 1; }
+	@command -v valgrind >/dev/null || (apt-get update && apt-get install --yes valgrind) >/dev/null 2>&1 || \
+	  { echo "valgrind is missing and could not be installed: apt-get install valgrind"; exit 1; }
 
 build/tools/importers/installed: tests/tools/requirements.txt
 	$(PYTHON) -m venv --clear $(@D)

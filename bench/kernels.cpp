@@ -35,7 +35,7 @@ double triad() {
   const double seconds = best([&] {
     for (std::size_t i = 0; i < n; ++i) a[i] = b[i] + 3.0 * c[i];
     asm volatile("" : : "r"(a.data()) : "memory");
-  }, 0.01);
+  });
   return 24e-9 * static_cast<double>(n) / seconds;
 }
 
@@ -147,7 +147,7 @@ class Cycle {
 void kernels(const Case& what, int slaves, bool shuffled, int threads) {
   const double gbs = triad();
   Cycle cycle(what, slaves, shuffled, threads);
-  const double seconds = best(cycle, 0.002, 100);  // short runs: some of them have the machine for themselves
+  const double seconds = best(cycle);
   row((what.name + (shuffled ? "-shuffled" : "")).c_str(), static_cast<std::size_t>(cycle.slaves()), threads,
       1e9 * seconds / cycle.slaves(), "ns per slave and cycle", bytesMoved(what), gbs);
 }
@@ -183,7 +183,7 @@ void search(int slaves, bool shuffled) {
         const Vec3& x = scene.nodes.position[s];
         found += (method == SearchMethod::box ? search.box(x, reach) : search.nearestNode(x, 2 * reach)).segment >= 0;
       }
-    }, 0.05, 3);
+    }, 2);
     if (found != wanted.size()) std::exit(1);
     const std::string name = method == SearchMethod::box ? "search-box" : "search-nearest-node";
     row((name + (shuffled ? "-shuffled" : "")).c_str(), found, 1, seconds, "s");

@@ -13,13 +13,16 @@ inline double now() {
   return duration<double>(steady_clock::now().time_since_epoch()).count();
 }
 
-// Best of `runs` runs of `body`, each of at least `enough` seconds, in seconds per call.
+// Best of many short runs of `body`, some of which have the machine for themselves, in seconds per call. At least `least`,
+// and no more than a hundred or than fit in two seconds.
 template <class Body>
-double best(Body&& body, double enough = 0.05, int runs = 7) {
+double best(Body&& body, int least = 7) {
+  constexpr double enough = 0.002, time = 2;
   body();
   long calls = 1;
   double shortest = 1e30;
-  for (int run = 0; run < runs;) {
+  const double begin = now();
+  for (int run = 0; run < least || (run < 100 && now() - begin < time);) {
     const double start = now();
     for (long k = 0; k < calls; ++k) body();
     const double taken = now() - start;
