@@ -83,9 +83,11 @@ TIEFMU_INLINE Pack operator*(const Columns& m, Pack a) {
 
 // The same number of four neighbours, side by side.
 using Lanes = double __attribute__((vector_size(32)));
-struct Lanes3 {
-  Lanes x, y, z;
+template <class Number>
+struct Three {
+  Number x, y, z;
 };
+using Lanes3 = Three<Lanes>;
 #ifdef __AVX2__
 TIEFMU_INLINE Lanes root(Lanes a) { return _mm256_sqrt_pd(a); }
 // Four vectors of three, one a lane.
@@ -120,14 +122,18 @@ TIEFMU_INLINE void storeFour(double* p, std::ptrdiff_t stride, int count, Lanes 
   }
 }
 #endif
-TIEFMU_INLINE Lanes3 operator+(const Lanes3& a, const Lanes3& b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
-TIEFMU_INLINE Lanes3 operator-(const Lanes3& a, const Lanes3& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
-TIEFMU_INLINE Lanes3 operator*(const Lanes& s, const Lanes3& a) { return {s * a.x, s * a.y, s * a.z}; }
-TIEFMU_INLINE Lanes3 operator*(double s, const Lanes3& a) { return {s * a.x, s * a.y, s * a.z}; }
-TIEFMU_INLINE Lanes3 cross(const Lanes3& a, const Lanes3& b) {
+template <class N>
+TIEFMU_INLINE Three<N> operator+(const Three<N>& a, const Three<N>& b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
+template <class N>
+TIEFMU_INLINE Three<N> operator-(const Three<N>& a, const Three<N>& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
+template <class S, class N>
+TIEFMU_INLINE Three<N> operator*(const S& s, const Three<N>& a) { return {s * a.x, s * a.y, s * a.z}; }
+template <class N>
+TIEFMU_INLINE Three<N> cross(const Three<N>& a, const Three<N>& b) {
   return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
-TIEFMU_INLINE Lanes dot(const Lanes3& a, const Lanes3& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+template <class N>
+TIEFMU_INLINE N dot(const Three<N>& a, const Three<N>& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 
 }  // namespace
 }  // namespace tiefmu

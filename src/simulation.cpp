@@ -185,7 +185,8 @@ struct Simulation::Impl {
   // Of all nodes after h more at the present velocities (0: as they stand).
   void checkPlaces(double h) {
     const double *x = field(Field::position), *v = field(Field::velocity);
-    if (h == 0 && allWithin(layout[Field::position].count, x, farAway)) return;
+    const std::size_t count = layout[Field::position].count;
+    if (allWithin(count, x, farAway / 2) && (h == 0 || allWithin(count, v, farAway / (2 * h)))) return;
     for (std::size_t k = 0; k < layout[Field::position].count; ++k) {
       if (std::abs(x[k] + h * v[k]) < farAway) continue;  // false for NaN
       char text[120];

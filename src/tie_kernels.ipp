@@ -394,30 +394,36 @@ bool updateFrames(const TieView& tie, const double* position, SegmentFrame* fram
   return sound(unsound);
 }
 
-// Four offsets by d + sin(a)/a (angle x d) + (1 - cos a)/a^2 angle x (angle x d), a = |angle| [Rodrigues].
-TIEFMU_INLINE void turnFour(const double* angle, const double* inverseLength2, double* offset) {
-  const Lanes3 u = loadFour(angle, angle + 3, angle + 6, angle + 9);
-  const Lanes3 d = loadFour(offset, offset + 3, offset + 6, offset + 9);
-  const Lanes a2 = dot(u, u);
-  // A step of 2 degrees at most: the terms left out are below 1e-17.
-  Lanes s = 1 + a2 * (-1.0 / 6 + a2 * (1.0 / 120 - a2 * (1.0 / 5040)));
-  Lanes c = 0.5 + a2 * (-1.0 / 24 + a2 * (1.0 / 720 - a2 * (1.0 / 40320)));
-  if ((a2[0] >= 1e-3) | (a2[1] >= 1e-3) | (a2[2] >= 1e-3) | (a2[3] >= 1e-3))
-    for (int k = 0; k < 4; ++k) {
-      if (!(a2[k] >= 1e-3)) continue;
-      const double a = std::sqrt(a2[k]), half = std::sin(0.5 * a);
-      s[k] = std::sin(a) / a;
-      c[k] = 2 * half * half / a2[k];
-    }
-  const Lanes3 once = cross(u, d), turned = d + s * once + c * cross(u, once);
-  // One Newton step of 1/sqrt: exact, as the length is off by rounding only.
-  const Lanes inverse = {inverseLength2[0], inverseLength2[1], inverseLength2[2], inverseLength2[3]};
-  const Lanes3 result = (1.5 - 0.5 * dot(turned, turned) * inverse) * turned;
+// sin(a)/a and (1 - cos a)/a^2 of steps above 2 degrees.
+TIEFMU_INLINE void large(double a2, double& s, double& c) {
+  if (!(a2 >= 1e-3)) return;
+  const double a = std::sqrt(a2), half = std::sin(0.5 * a);
+  s = std::sin(a) / a;
+  c = 2 * half * half / a2;
+}
+TIEFMU_INLINE void large(const Lanes& a2, Lanes& s, Lanes& c) {
+  if (!((a2[0] >= 1e-3) | (a2[1] >= 1e-3) | (a2[2] >= 1e-3) | (a2[3] >= 1e-3))) return;
   for (int k = 0; k < 4; ++k) {
-    offset[3 * k] = result.x[k];
-    offset[3 * k + 1] = result.y[k];
-    offset[3 * k + 2] = result.z[k];
+    double sk = s[k], ck = c[k];
+    large(a2[k], sk, ck);
+    s[k] = sk;
+    c[k] = ck;
   }
+}
+
+// d + sin(a)/a (angle x d) + (1 - cos a)/a^2 angle x (angle x d), a = |angle| [Rodrigues], at its length, of which
+// `inverse` is 1/square.
+template <class N>
+TIEFMU_INLINE Three<N> turned(const Three<N>& angle, const Three<N>& d, const N& inverse) {
+  const N a2 = dot(angle, angle);
+  // The terms left out are below 1e-17.
+  N s = 1 + a2 * (-1.0 / 6 + a2 * (1.0 / 120 - a2 * (1.0 / 5040)));
+  N c = 0.5 + a2 * (-1.0 / 24 + a2 * (1.0 / 720 - a2 * (1.0 / 40320)));
+  large(a2, s, c);
+  const Three<N> once = cross(angle, d), next = d + s * once + c * cross(angle, once);
+  // One Newton step of 1/sqrt: exact, as the length is off by rounding only.
+  const N scale = 1.5 - 0.5 * dot(next, next) * inverse;
+  return scale * next;
 }
 
 void turnOffsets(const TieView& tie, double h, const double* spin, const double* inverseLength2, double* offset) {
@@ -426,7 +432,18 @@ void turnOffsets(const TieView& tie, double h, const double* spin, const double*
   std::ptrdiff_t first = tie.firstSlave + tie.begin[tie.range.first];
   int count = 0;
   const auto turn = [&](int fours) TIEFMU_INLINED {
-    for (int k = 0; k < fours; k += 4) turnFour(angle + 3 * k, inverseLength2 + first + k, offset + 3 * (first + k));
+    for (int k = 0; k < fours; k += 4) {
+      const double* u = angle + 3 * k;
+      double* d = offset + 3 * (first + k);
+      const double* i = inverseLength2 + first + k;
+      const Lanes inverse = {i[0], i[1], i[2], i[3]};
+      const Lanes3 next = turned(loadFour(u, u + 3, u + 6, u + 9), loadFour(d, d + 3, d + 6, d + 9), inverse);
+      for (int m = 0; m < 4; ++m) {
+        d[3 * m] = next.x[m];
+        d[3 * m + 1] = next.y[m];
+        d[3 * m + 2] = next.z[m];
+      }
+    }
     first += fours;
   };
   byCorners(tie, [&](auto n) TIEFMU_INLINED {
@@ -446,17 +463,17 @@ void turnOffsets(const TieView& tie, double h, const double* spin, const double*
       }
     });
   });
-  const int left = count % 4, begin = count - left;
-  turn(begin);
-  if (left == 0) return;
-  double d[12] = {}, w[12] = {}, inverse[4] = {};
-  for (int i = 0; i < 3 * left; ++i) {
-    d[i] = offset[3 * first + i];
-    w[i] = angle[3 * begin + i];
-    inverse[i / 3] = inverseLength2[first + i / 3];
+  const int fours = count - count % 4;
+  turn(fours);
+  for (int k = fours; k < count; ++k) {
+    const double* u = angle + 3 * k;
+    double* d = offset + 3 * (first + k - fours);
+    const Three<double> next = turned(Three<double>{u[0], u[1], u[2]}, Three<double>{d[0], d[1], d[2]},
+                                      inverseLength2[first + k - fours]);
+    d[0] = next.x;
+    d[1] = next.y;
+    d[2] = next.z;
   }
-  turnFour(w, inverse, d);
-  for (int i = 0; i < 3 * left; ++i) offset[3 * first + i] = d[i];
 }
 
 // q <- (1, u) q, scaled to unit length, for the first `count` of four quaternions.
