@@ -10,6 +10,7 @@ import csv
 import datetime
 import platform
 import shutil
+import statistics
 import subprocess
 import sys
 import tempfile
@@ -170,17 +171,16 @@ def chart(rows: list[list[str]], made: list[str]) -> None:
                 own = [row for row in rows if row[0] == case and row[2] == str(threads)]
                 axis.plot([int(row[1]) for row in own], [float(row[3]) for row in own], style, color=colour, markersize=4,
                           label=f"{case.removesuffix('-consistent')}, {threads} thread" + "s" * (threads > 1))
-            large = [row for row in rows if row[0] == case and float(row[5]) and int(row[1]) >= 100_000]
-            if large:
-                axis.plot([int(row[1]) for row in large], [float(row[5]) / float(row[6]) for row in large], ":",
-                          color=colour, linewidth=2)
+            triad = [float(row[5]) / float(row[6]) for row in rows if row[0] == case and float(row[5])]
+            if triad:
+                axis.axhline(statistics.median(triad), linestyle=":", color=colour, linewidth=1.5)
         shuffled = [row for row in rows if row[0] in [f"{case}-shuffled" for case in cases]]
         for row in shuffled:
             axis.plot(int(row[1]), float(row[3]), "x", color=colours[row[0].removesuffix("-shuffled")], markersize=7)
         axis.set(xscale="log", yscale="log", xlabel="slaves", title=title)
         axis.grid(alpha=0.25)
     axes[0].set_ylabel("ns per slave and cycle")
-    axes[0].plot([], [], ":", color="#444", linewidth=2, label="bytes that must move / triad")
+    axes[0].plot([], [], ":", color="#444", linewidth=1.5, label="bytes that must move / triad")
     axes[0].plot([], [], "x", color="#444", label="slaves shuffled")
     axes[0].legend(frameon=False, fontsize=8)
     figure.supxlabel("; ".join(made), fontsize=7, color="#555")
