@@ -33,7 +33,7 @@ sanitize: $(VENV)/installed
 	TIEFMU_SEQUENCES=$(SEQUENCES) $(BIN)/python -m pytest -s tests/test_sanitizers.py
 
 # Clang brings libFuzzer.
-CLANG ?= clang++
+CLANG ?= $(or $(shell command -v clang++ || command -v clang++-14),clang++)
 FUZZ_SECONDS ?= 20
 fuzz: $(VENV)/installed
 	PATH=$(abspath $(BIN)):$$PATH cmake --preset fuzz -DCMAKE_CXX_COMPILER=$(CLANG) -DPython_EXECUTABLE=$(abspath $(BIN)/python)

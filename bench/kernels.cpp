@@ -107,9 +107,10 @@ double bytesMoved(const Case& what) {
     slave += 24 + 96 + 24 + 8 + 32;
     master += 96 + 48 + 24 + 96 + 16;
   } else if (what.coupling == "optimized") {
-    // No Phi; M (24), d0 (24), d written and read twice (72), w_s (24); masters: x (48), frames (168 thrice), quaternion (64).
+    // No Phi; M (24), d0 (24), d written and read twice (72), w_s (24); masters: x (48), frames (192 written, 168 read
+    // twice), quaternion (64).
     slave += 24 + 24 + 72 + 24 - 64;
-    master += 48 + 504 + 64 + 32;
+    master += 48 + 528 + 64 + 32;
   }
   return slave + master / 4;
 }
