@@ -161,3 +161,12 @@ def test_a_build_imports_nothing_slow(weld, scene_file):
             "print([m for m in ('matplotlib', 'fmpy', 'tqdm') if m in sys.modules])")
     done = subprocess.run([sys.executable, "-c", code, scene_file(weld)], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+def test_scenes_that_cannot_be_run_have_no_reference_results(tmp_path):
+    """At 9.2e18 m/s the face is stretched until a step would take 2e17 substeps."""
+    scene = next(path for path in SCENES if path.stem == "spinning").read_text()
+    assert scene.count("v = [1.0, 1.0, -0.2]") == 1
+    (tmp_path / "fast.toml").write_text(scene.replace("v = [1.0, 1.0, -0.2]", "v = [9223372036854775808, 1.0, -0.2]"))
+    fmu = tiefmu.build(tiefmu.load(tmp_path / "fast.toml"), tmp_path / "fast.fmu")
+    assert not any("reference" in name for name in zipfile.ZipFile(fmu).namelist())
