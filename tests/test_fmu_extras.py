@@ -170,3 +170,14 @@ def test_scenes_that_cannot_be_run_have_no_reference_results(tmp_path):
     (tmp_path / "fast.toml").write_text(scene.replace("v = [1.0, 1.0, -0.2]", "v = [9223372036854775808, 1.0, -0.2]"))
     fmu = tiefmu.build(tiefmu.load(tmp_path / "fast.toml"), tmp_path / "fast.fmu")
     assert not any("reference" in name for name in zipfile.ZipFile(fmu).namelist())
+
+
+def test_ports_that_lose_their_motion_on_the_way_have_no_reference_results(tmp_path):
+    """One node at 1e30 m makes steps so large that the port's slaves end on a line."""
+    corpus = Path(__file__).parent / "fuzz" / "corpus" / "scene"
+    mesh = (corpus / "panel.inp").read_text()
+    assert mesh.count(" 60, 0.2, 0.1, 0.\n") == 1
+    (tmp_path / "panel.inp").write_text(mesh.replace(" 60, 0.2, 0.1, 0.\n", " 60, 0.2, 0.1, 1e30\n"))
+    (tmp_path / "ports.toml").write_text((corpus / "ports.toml").read_text())
+    fmu = tiefmu.build(tiefmu.load(tmp_path / "ports.toml"), tmp_path / "ports.fmu")
+    assert not any("reference" in name for name in zipfile.ZipFile(fmu).namelist())

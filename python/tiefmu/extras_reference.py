@@ -23,18 +23,18 @@ def reference(scene: Scene, step: float) -> dict[str, bytes]:
     outputs = [name for block in variables if block["causality"] == "output" for name in names(block)]
     simulation = scene.simulation()
     rows = []
-    for k in range(STEPS + 1):
-        if inputs:
-            simulation.set_values(list(inputs), np.array([values[k] for values in inputs.values()]))
-        if k == 0:
-            simulation.initialise(0.0)
-        rows.append(simulation.get_values(outputs) if k == 0 else answer)
-        if k < STEPS:
-            try:
+    try:
+        for k in range(STEPS + 1):
+            if inputs:
+                simulation.set_values(list(inputs), np.array([values[k] for values in inputs.values()]))
+            if k == 0:
+                simulation.initialise(0.0)
+            rows.append(simulation.get_values(outputs) if k == 0 else answer)
+            if k < STEPS:
                 simulation.step(step)
-            except RuntimeError:  # Diverged, or more substeps than any run could make
-                return {}
-            answer = simulation.get_values(outputs)
+                answer = simulation.get_values(outputs)
+    except RuntimeError:  # Diverged, or more substeps than any run could make
+        return {}
     return {f"{FOLDER}/reference_in.csv": table(times, list(inputs), np.array(list(inputs.values())).T),
             f"{FOLDER}/reference_out.csv": table(times, outputs, np.array(rows))}
 
