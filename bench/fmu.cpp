@@ -43,8 +43,7 @@ class Library {
   explicit Library(const std::string& path) : handle_(dlopen(path.c_str(), RTLD_NOW | RTLD_LOCAL)) {
     if (!handle_) fail(dlerror());
   }
-  template <class Function>
-  Function* function(const char* name) const {
+  template <class Function> Function* function(const char* name) const {
     return reinterpret_cast<Function*>(dlsym(handle_, name));
   }
 
@@ -69,7 +68,8 @@ struct Slaves {
     const std::string xml((std::istreambuf_iterator<char>(file)), {});
     const std::size_t at = xml.find("guid=\"") + 6;
     guid = xml.substr(at, xml.find('"', at) - at);
-    for (std::size_t p = xml.find("<ScalarVariable "); p != std::string::npos; p = xml.find("<ScalarVariable ", p + 1)) {
+    for (std::size_t p = xml.find("<ScalarVariable "); p != std::string::npos;
+         p = xml.find("<ScalarVariable ", p + 1)) {
       const std::string head = xml.substr(p, xml.find('>', p) - p);
       const std::size_t r = head.find("valueReference=\"");
       const auto reference = static_cast<fmi2ValueReference>(std::strtoul(head.c_str() + r + 16, nullptr, 10));
@@ -131,10 +131,13 @@ void values(const Library& ours, fmi2Component c, Slaves slaves) {
     bench::shuffle(slaves.velocities);
   }
   std::vector<double> to(values.size());
-  row("memcpy", to.size(), 1, each(best([&] {
-        std::copy(values.begin(), values.end(), to.begin());
-        asm volatile("" : : "r"(to.data()) : "memory");
-      }), to.size()), "ns per value");
+  row("memcpy", to.size(), 1,
+      each(best([&] {
+             std::copy(values.begin(), values.end(), to.begin());
+             asm volatile("" : : "r"(to.data()) : "memory");
+           }),
+           to.size()),
+      "ns per value");
 }
 
 // One column of the Jacobian beside one step with set and get, and a state on its way out and back.
@@ -161,9 +164,8 @@ void large(const Library& ours, fmi2Component c, const Slaves& slaves) {
     t += h;
   });
   row("set-step-get", n, 1, each(step, n), "ns per slave");
-  const double column = best([&] {
-    check(fmi2GetDirectionalDerivative(c, out.data(), out.size(), in.data(), 1, &one, values.data()));
-  });
+  const double column =
+      best([&] { check(fmi2GetDirectionalDerivative(c, out.data(), out.size(), in.data(), 1, &one, values.data())); });
   row("derivative-column", n, 1, each(column, n), "ns per slave");
   row("derivative-ratio", n, 1, column / step, "times a step with set and get");
 
@@ -195,8 +197,8 @@ void bench::fmu(const char* folder, const char* nothingPath) {
   const Slaves slaves(place);
   const fmi2CallbackFunctions callbacks = {logMessage, std::calloc, std::free, nullptr, nullptr};
   const double start = now();
-  fmi2Component c = fmi2Instantiate("bench", fmi2CoSimulation, slaves.guid.c_str(), ("file://" + place + "/resources").c_str(),
-                                    &callbacks, fmi2False, fmi2False);
+  fmi2Component c = fmi2Instantiate("bench", fmi2CoSimulation, slaves.guid.c_str(),
+                                    ("file://" + place + "/resources").c_str(), &callbacks, fmi2False, fmi2False);
   if (!c) fail("the FMU cannot be instantiated");
   check(fmi2SetupExperiment(c, fmi2False, 0, 0, fmi2False, 0));
   check(fmi2EnterInitializationMode(c));

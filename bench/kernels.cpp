@@ -100,7 +100,8 @@ Scene surface(const Case& what, int slaves, bool shuffled, int threads = 1) {
 double bytesMoved(const Case& what) {
   if (what.consistent) return 0;
   // Loads pass: F (24), Phi (32); motion pass: Phi (32), v_s (24 written).
-  // Masters, one per four slaves: indices twice (32), v three times with its kick (96), f (48), f_ext (24), a (96), mass (16).
+  // Masters, one per four slaves: indices twice (32), v three times with its kick (96), f (48), f_ext (24), a (96),
+  // mass (16).
   double slave = 24 + 32 + 32 + 24, master = 32 + 96 + 48 + 24 + 96 + 16;
   if (what.coupling == "default-rotations") {
     // M (24), d read three times and written (96), w_s (24), 1/d0^2 (8), Phi once more; masters: the same for rotation.
@@ -115,8 +116,8 @@ double bytesMoved(const Case& what) {
   return slave + master / 4;
 }
 
-// One simulation under its own loads, ready to cycle. With consistent inertia those on the masters change in every cycle:
-// an iteration that starts from the solution would have nothing to do.
+// One simulation under its own loads, ready to cycle. With consistent inertia those on the masters change in every
+// cycle: an iteration that starts from the solution would have nothing to do.
 class Cycle {
  public:
   Cycle(const Case& what, int slaves, bool shuffled, int threads)
@@ -176,15 +177,18 @@ void search(int slaves, bool shuffled) {
   const std::vector<int>& wanted = scene.ties[0].slaves;
   for (const SearchMethod method : {SearchMethod::box, SearchMethod::nearestNode}) {
     std::size_t found = 0;
-    const double seconds = best([&] {
-      found = 0;
-      const SegmentSearch search(scene.nodes.position, scene.segments.nodes, scene.segments.id);
-      const double reach = search.defaultDistance();
-      for (int s : wanted) {
-        const Vec3& x = scene.nodes.position[s];
-        found += (method == SearchMethod::box ? search.box(x, reach) : search.nearestNode(x, 2 * reach)).segment >= 0;
-      }
-    }, 2);
+    const double seconds = best(
+        [&] {
+          found = 0;
+          const SegmentSearch search(scene.nodes.position, scene.segments.nodes, scene.segments.id);
+          const double reach = search.defaultDistance();
+          for (int s : wanted) {
+            const Vec3& x = scene.nodes.position[s];
+            found +=
+                (method == SearchMethod::box ? search.box(x, reach) : search.nearestNode(x, 2 * reach)).segment >= 0;
+          }
+        },
+        2);
     if (found != wanted.size()) std::exit(1);
     const std::string name = method == SearchMethod::box ? "search-box" : "search-nearest-node";
     row((name + (shuffled ? "-shuffled" : "")).c_str(), found, 1, seconds, "s");
@@ -202,12 +206,16 @@ int main(int argc, char** argv) {
   } else if (what == "cycles" && argc > 4) {
     Cycle cycle(Case(argv[2]), std::atoi(argv[3]), false, 1);
     for (int k = std::atoi(argv[4]); k > 0; --k) cycle();
-  } else if (what == "memory" && argc > 3) memory(Case(argv[2]), std::atoi(argv[3]));
-  else if (what == "search" && argc > 2) search(std::atoi(argv[2]), argc > 3 && !std::strcmp(argv[3], "shuffled"));
-  else if (what == "fmu" && argc > 3) bench::fmu(argv[2], argv[3]);
+  } else if (what == "memory" && argc > 3)
+    memory(Case(argv[2]), std::atoi(argv[3]));
+  else if (what == "search" && argc > 2)
+    search(std::atoi(argv[2]), argc > 3 && !std::strcmp(argv[3], "shuffled"));
+  else if (what == "fmu" && argc > 3)
+    bench::fmu(argv[2], argv[3]);
   else {
-    std::fprintf(stderr, "usage: tiefmu_bench kernels CASE N [shuffled] [THREADS] | cycles CASE N COUNT | "
-                         "memory CASE N | search N [shuffled] | fmu FOLDER NOTHING\n");
+    std::fprintf(stderr,
+                 "usage: tiefmu_bench kernels CASE N [shuffled] [THREADS] | cycles CASE N COUNT | "
+                 "memory CASE N | search N [shuffled] | fmu FOLDER NOTHING\n");
     return 2;
   }
 }

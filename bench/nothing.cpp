@@ -10,7 +10,8 @@ extern "C" {
 static double values[8];
 
 EXPORT fmi2Status fmi2DoStep(fmi2Component, fmi2Real, fmi2Real, fmi2Boolean) { return fmi2OK; }
-EXPORT fmi2Status fmi2SetReal(fmi2Component, const fmi2ValueReference references[], size_t count, const fmi2Real given[]) {
+EXPORT fmi2Status fmi2SetReal(fmi2Component, const fmi2ValueReference references[], size_t count,
+                              const fmi2Real given[]) {
   for (size_t k = 0; k < count; ++k) values[references[k] & 7] = given[k];
   return fmi2OK;
 }

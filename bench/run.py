@@ -1,8 +1,8 @@
 """Times the kernels, the FMU's calls and the work round them; prints one table, writes bench/latest.csv and the chart.
 
-    make bench                               all of it, in about ten minutes
-    python bench/run.py --n 1 1e3            cycles of these numbers of slaves only, without the rest and the chart
-    python bench/run.py --instructions       count instructions and make them the reference of tests/test_instructions.py
+make bench                               all of it, in about ten minutes
+python bench/run.py --n 1 1e3            cycles of these numbers of slaves only, without the rest and the chart
+python bench/run.py --instructions       count instructions and make them the reference of tests/test_instructions.py
 """
 
 import argparse
@@ -31,12 +31,22 @@ GROWTH = [1_000, 10_000, 100_000]  # slaves of the scenes that are loaded and bu
 
 # ---------------------------------------------------------------------------------------------------------- measuring
 
+
 def program() -> Path:
     """The benchmark program, built with the release preset; `nothing.so` lies beside it."""
     cmake = Path(sys.executable).with_name("cmake")
     path = {"cwd": ROOT, "check": True, "stdout": subprocess.DEVNULL}
-    subprocess.run([cmake, "--preset", "release", f"-DPython_EXECUTABLE={sys.executable}", "-DTIEFMU_PYTHON=OFF",
-                    f"-DCMAKE_MAKE_PROGRAM={cmake.with_name('ninja')}"], **path)
+    subprocess.run(
+        [
+            cmake,
+            "--preset",
+            "release",
+            f"-DPython_EXECUTABLE={sys.executable}",
+            "-DTIEFMU_PYTHON=OFF",
+            f"-DCMAKE_MAKE_PROGRAM={cmake.with_name('ninja')}",
+        ],
+        **path,
+    )
     subprocess.run([cmake, "--build", "--preset", "release", "--target", "tiefmu_bench", "tiefmu_nothing"], **path)
     return ROOT / "build" / "release" / "tiefmu_bench"
 
@@ -77,6 +87,7 @@ def growth(bench: Path) -> list[list[str]]:
 def calls(bench: Path) -> list[list[str]]:
     import tiefmu
     from growth import ONE_SLAVE, surface
+
     rows, nothing = [], bench.with_name("nothing.so")
     with tempfile.TemporaryDirectory() as folder:
         for name, scene in (("one", ONE_SLAVE), ("many", surface(10_000)), ("free", surface(100_000, motion="free"))):
@@ -89,6 +100,7 @@ def calls(bench: Path) -> list[list[str]]:
 
 # ------------------------------------------------------------------------------------------------------- instructions
 
+
 def instructions(bench: Path) -> dict[str, float]:
     """Instructions per slave and cycle: the difference of two runs, so that nothing but cycles is counted."""
     valgrind = shutil.which("valgrind")
@@ -97,10 +109,24 @@ def instructions(bench: Path) -> dict[str, float]:
     few, many = 4, 24
 
     def total(case: str, count: int) -> int:
-        done = subprocess.run([valgrind, "--tool=callgrind", "--callgrind-out-file=/dev/null", bench, "cycles", case,
-                               str(COUNTED), str(count)], check=True, capture_output=True, text=True)
+        done = subprocess.run(
+            [
+                valgrind,
+                "--tool=callgrind",
+                "--callgrind-out-file=/dev/null",
+                bench,
+                "cycles",
+                case,
+                str(COUNTED),
+                str(count),
+            ],
+            check=True,
+            capture_output=True,
+            text=True,
+        )
         line = next(line for line in done.stderr.splitlines() if "Collected" in line)
         return int(line.split()[-1])
+
     return {case: (total(case, many) - total(case, few)) / (many - few) / COUNTED for case in FORMULATIONS + CONSISTENT}
 
 
@@ -108,7 +134,8 @@ def write_reference(counts: dict[str, float]) -> None:
     with REFERENCE.open("w", newline="") as file:
         file.write(f"# instructions per slave and cycle at {COUNTED} slaves; {compiler()}; {simd()}\n")
         csv.writer(file, lineterminator="\n").writerows(
-            [["case", "instructions"], *([case, f"{count:.1f}"] for case, count in counts.items())])
+            [["case", "instructions"], *([case, f"{count:.1f}"] for case, count in counts.items())]
+        )
 
 
 def reference() -> tuple[dict[str, float], str]:
@@ -119,6 +146,7 @@ def reference() -> tuple[dict[str, float], str]:
 
 
 # ------------------------------------------------------------------------------------------------------------- machine
+
 
 def compiler() -> str:
     return subprocess.run(["c++", "--version"], capture_output=True, text=True).stdout.splitlines()[0]
@@ -140,11 +168,15 @@ def cpuinfo(key: str) -> str:
 
 def made_with() -> list[str]:
     commit = subprocess.run(["git", "describe", "--always", "--dirty"], cwd=ROOT, capture_output=True, text=True).stdout
-    return [f"{cpuinfo('model name') or platform.processor()}, {cpuinfo('siblings') or '?'} threads",
-            compiler(), f"{datetime.date.today()}, commit {commit.strip() or 'unknown'}"]
+    return [
+        f"{cpuinfo('model name') or platform.processor()}, {cpuinfo('siblings') or '?'} threads",
+        compiler(),
+        f"{datetime.date.today()}, commit {commit.strip() or 'unknown'}",
+    ]
 
 
 # -------------------------------------------------------------------------------------------------------------- output
+
 
 def table(rows: list[list[str]]) -> str:
     lines = [f"{'case':32}{'n':>9}{'threads':>9}{'value':>12}  {'unit':26}{'bytes':>6}{'times bytes/triad':>19}"]
@@ -159,9 +191,11 @@ def table(rows: list[list[str]]) -> str:
 def chart(rows: list[list[str]], made: list[str]) -> None:
     """ns per slave and cycle against the number of slaves; dotted: what a triad needs for the bytes that must move."""
     import matplotlib
+
     matplotlib.use("svg")
     matplotlib.rcParams["svg.hashsalt"] = "bench"
     import matplotlib.pyplot as plt
+
     colours = dict(zip(FORMULATIONS, ["#0072B2", "#009E73", "#D55E00"]))
     figure, axes = plt.subplots(1, 2, figsize=(11, 5), layout="constrained", sharex=True, sharey=True)
     for axis, cases, title in ((axes[0], FORMULATIONS, "lumped inertia"), (axes[1], CONSISTENT, "consistent inertia")):
@@ -169,8 +203,14 @@ def chart(rows: list[list[str]], made: list[str]) -> None:
             colour = colours[case.removesuffix("-consistent")]
             for threads, style in ((1, "-o"), (2, "--s")):
                 own = [row for row in rows if row[0] == case and row[2] == str(threads)]
-                axis.plot([int(row[1]) for row in own], [float(row[3]) for row in own], style, color=colour, markersize=4,
-                          label=f"{case.removesuffix('-consistent')}, {threads} thread" + "s" * (threads > 1))
+                axis.plot(
+                    [int(row[1]) for row in own],
+                    [float(row[3]) for row in own],
+                    style,
+                    color=colour,
+                    markersize=4,
+                    label=f"{case.removesuffix('-consistent')}, {threads} thread" + "s" * (threads > 1),
+                )
             triad = [float(row[5]) / float(row[6]) for row in rows if row[0] == case and float(row[5])]
             if triad:
                 axis.axhline(statistics.median(triad), linestyle=":", color=colour, linewidth=1.5)
@@ -202,8 +242,10 @@ def main() -> None:
         print(table(cycles(bench, [int(n) for n in options.n])))
         return
     rows = cycles(bench, SLAVES) + growth(bench) + calls(bench)
-    rows += [[f"instructions-{case}", COUNTED, 1, f"{count:.1f}", "per slave and cycle", 0, 0]
-             for case, count in instructions(bench).items()]
+    rows += [
+        [f"instructions-{case}", COUNTED, 1, f"{count:.1f}", "per slave and cycle", 0, 0]
+        for case, count in instructions(bench).items()
+    ]
     with LATEST.open("w", newline="") as file:
         file.writelines(f"# {line}\n" for line in made)
         csv.writer(file, lineterminator="\n").writerows([COLUMNS, *rows])

@@ -13,10 +13,9 @@ inline double now() {
   return duration<double>(steady_clock::now().time_since_epoch()).count();
 }
 
-// Best of many short runs of `body`, some of which have the machine for themselves, in seconds per call. At least `least`,
-// and no more than a hundred or than fit in two seconds.
-template <class Body>
-double best(Body&& body, int least = 7) {
+// Best of many short runs of `body`, some of which have the machine for themselves, in seconds per call. At least
+// `least`, and no more than a hundred or than fit in two seconds.
+template <class Body> double best(Body&& body, int least = 7) {
   constexpr double enough = 0.002, time = 2;
   body();
   long calls = 1;
@@ -44,8 +43,7 @@ inline void row(const char* name, std::size_t n, int threads, double value, cons
 }
 
 // The same permutation on every machine.
-template <class Values>
-void shuffle(Values& values) {
+template <class Values> void shuffle(Values& values) {
   unsigned long long seed = 1;
   for (std::size_t k = values.size(); k-- > 1;) {
     seed = seed * 6364136223846793005u + 1442695040888963407u;

@@ -12,7 +12,7 @@ enum State : unsigned {
   stepCanceled = 32,   // never entered
   terminated = 64,
   error = 128,
-  fatal = 256,         // never entered
+  fatal = 256,  // never entered
 };
 
 constexpr const char* stateName(State state) {

@@ -57,8 +57,7 @@ void Instance::setInputDerivatives(const fmi2ValueReference refs[], std::size_t 
       throw Refused("derivatives of inputs have order 1 or 2, not " + std::to_string(orders[k]));
     if (!std::isfinite(values[k])) refuseValue(refs[k], values + k);
   }
-  for (std::size_t k = 0; k < count; ++k)
-    simulation.setInputDerivative(inputAt(refs[k]), orders[k], values[k]);
+  for (std::size_t k = 0; k < count; ++k) simulation.setInputDerivative(inputAt(refs[k]), orders[k], values[k]);
 }
 
 void Instance::outputDerivatives(const fmi2ValueReference refs[], std::size_t count, const fmi2Integer orders[],

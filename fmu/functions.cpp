@@ -14,8 +14,7 @@ namespace {
 
 // Runs body(instance) where the call is allowed. What goes wrong is logged and returned as fmi2Error; unless the call
 // was merely refused, the instance is then in the state `error`, which only fmi2Reset and fmi2SetFMUstate leave.
-template <class Body>
-fmi2Status guard(fmi2Component component, const Call& call, Body body) noexcept {
+template <class Body> fmi2Status guard(fmi2Component component, const Call& call, Body body) noexcept {
   auto* instance = static_cast<Instance*>(component);
   if (!instance) return fmi2Error;
   const auto fail = [&](const char* message, State next) {
@@ -174,9 +173,8 @@ fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte bytes[], size
 fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReference unknown[], size_t unknowns,
                                         const fmi2ValueReference known[], size_t knowns, const fmi2Real seed[],
                                         fmi2Real change[]) {
-  return guard(c, call::getDirectionalDerivative, [&](Instance& i) {
-    i.directionalDerivative(unknown, unknowns, known, knowns, seed, change);
-  });
+  return guard(c, call::getDirectionalDerivative,
+               [&](Instance& i) { i.directionalDerivative(unknown, unknowns, known, knowns, seed, change); });
 }
 
 fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,

@@ -281,9 +281,12 @@ void Instance::set(const fmi2ValueReference refs[], std::size_t count, const dou
   runs.clear();
   // First all checks: a refused call changes nothing.
   forRuns(refs, count, [&](const Range& range, std::uint32_t first, std::size_t run, std::size_t i) {
-    if (range.causality == Causality::input) inputs = true;
-    else if (range.causality == Causality::parameter && state != stepComplete) parameters = true;
-    else refuseToSet(range, first);
+    if (range.causality == Causality::input)
+      inputs = true;
+    else if (range.causality == Causality::parameter && state != stepComplete)
+      parameters = true;
+    else
+      refuseToSet(range, first);
     if (!allFinite(values + i, run)) refuseValue(first, values + i);
     runs.push_back({values + i, data + range.place + (first - range.first), run});
   });
@@ -310,7 +313,8 @@ void Instance::doStep(double point, double step) {
   } catch (const Diverged& e) {
     for (const Range& r : ranges)
       if (e.place >= r.place && e.place - r.place < r.end - r.first)
-        throw Diverged(e.what() + ("; variable '" + nameOf(r.first + static_cast<std::uint32_t>(e.place - r.place)) + "'"));
+        throw Diverged(e.what() +
+                       ("; variable '" + nameOf(r.first + static_cast<std::uint32_t>(e.place - r.place)) + "'"));
     throw;
   }
   clock.time = point + step;  // the master's sum, so that rounding does not pull the two apart

@@ -20,9 +20,7 @@ extern "C" {
 namespace tiefmu {
 
 // A call that is refused: the instance is as before. Every other exception puts it into the state `error`.
-struct Refused : std::runtime_error {
-  using std::runtime_error::runtime_error;
-};
+struct Refused : std::runtime_error { using std::runtime_error::runtime_error; };
 
 // Indexes of logCategories.
 enum class Category { error, warning, tie, stability, all };
@@ -117,8 +115,7 @@ class Instance {
   SavedState& known(fmi2FMUstate saved) const;
   void keep(fmi2FMUstate* saved, std::unique_ptr<SavedState> fresh);
   // Calls use(range, first reference, number, index of the first) for each run of consecutive references.
-  template <class Use>
-  void forRuns(const fmi2ValueReference references[], std::size_t count, Use use) const;
+  template <class Use> void forRuns(const fmi2ValueReference references[], std::size_t count, Use use) const;
   void require(const Range& range, std::uint32_t reference, Causality causality) const;
   std::size_t inputAt(std::uint32_t reference) const;  // its place
   void requireOutputs(const fmi2ValueReference references[], std::size_t count) const;
@@ -131,17 +128,16 @@ class Instance {
   std::vector<Range> ranges;
   std::vector<std::uint32_t> firstRange;  // range of every 64th reference
   std::uint32_t references = 0;
-  std::vector<Run> runs;  // of the present fmi2SetReal
+  std::vector<Run> runs;        // of the present fmi2SetReal
   std::vector<double> scratch;  // laid out like the simulation's array
   Clock clock;
   double hostStep = std::numeric_limits<double>::infinity();  // the least that a driven master's stiffness allows, s
-  int hostNode = 0, hostPort = -1;  // whose it is: a port's, else the node's
+  int hostNode = 0, hostPort = -1;                            // whose it is: a port's, else the node's
   bool warnedOfStep = false;
   std::unordered_map<fmi2FMUstate, std::unique_ptr<SavedState>> savedStates;
 };
 
-template <class Use>
-void Instance::forRuns(const fmi2ValueReference refs[], std::size_t count, Use use) const {
+template <class Use> void Instance::forRuns(const fmi2ValueReference refs[], std::size_t count, Use use) const {
   if (count > 0 && !refs) throw Refused("the array of value references is a null pointer");
   for (std::size_t i = 0; i < count;) {
     const std::uint32_t first = refs[i];

@@ -42,9 +42,7 @@ fmi2Status fmi2GetDerivatives(fmi2Component c, fmi2Real[], size_t) { return refu
 
 fmi2Status fmi2GetEventIndicators(fmi2Component c, fmi2Real[], size_t) { return refuse(c, "fmi2GetEventIndicators"); }
 
-fmi2Status fmi2GetContinuousStates(fmi2Component c, fmi2Real[], size_t) {
-  return refuse(c, "fmi2GetContinuousStates");
-}
+fmi2Status fmi2GetContinuousStates(fmi2Component c, fmi2Real[], size_t) { return refuse(c, "fmi2GetContinuousStates"); }
 
 fmi2Status fmi2GetNominalsOfContinuousStates(fmi2Component c, fmi2Real[], size_t) {
   return refuse(c, "fmi2GetNominalsOfContinuousStates");

@@ -61,8 +61,7 @@ struct Sink : std::streambuf {
 };
 
 // What is stored, once for both directions. `length` makes room for that many numbers when it reads.
-template <class Archive, class Saved, class Length>
-void fields(Archive& archive, Saved& s, Length length) {
+template <class Archive, class Saved, class Length> void fields(Archive& archive, Saved& s, Length length) {
   const auto sized = [&](auto& array) {
     std::uint64_t count = array.size();
     archive(count);
@@ -151,8 +150,7 @@ SavedState deserialize(std::string_view bytes, const std::string& guid, std::siz
     archive(characters);
     resize(origin, characters);
     archive(cereal::binary_data(origin.data(), origin.size()));
-    if (origin != guid)
-      throw StateError("the state belongs to another FMU, with GUID '" + printable(origin) + "'");
+    if (origin != guid) throw StateError("the state belongs to another FMU, with GUID '" + printable(origin) + "'");
     fields(archive, saved, resize);
   } catch (const cereal::Exception&) {
     throw StateError("the state is cut short");

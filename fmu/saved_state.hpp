@@ -21,9 +21,7 @@ struct SavedState {
 };
 
 // Bytes that are no state of this FMU. `what()` is one line.
-struct StateError : std::runtime_error {
-  using std::runtime_error::runtime_error;
-};
+struct StateError : std::runtime_error { using std::runtime_error::runtime_error; };
 
 // The same state gives the same bytes, on every machine. `guid`: of the FMU.
 std::size_t serializedSize(const SavedState& saved, const std::string& guid);

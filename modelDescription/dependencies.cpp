@@ -16,9 +16,7 @@ constexpr std::size_t longRow = 1000;
 constexpr double nearlyAll = 0.9;
 
 Dependence kindOf(Pattern p, int bit) {
-  return p.moving >> bit & 1     ? Dependence::dependent
-         : p.changing >> bit & 1 ? Dependence::fixed
-                                 : Dependence::constant;
+  return p.moving >> bit & 1 ? Dependence::dependent : p.changing >> bit & 1 ? Dependence::fixed : Dependence::constant;
 }
 
 class Analysis {
@@ -50,12 +48,12 @@ class Analysis {
   std::size_t inputs = 0;
 
   // Accelerations that a mass matrix couples form a class: they depend on the same knowns.
-  std::vector<std::uint32_t> parent;  // union-find over 6 freedoms of each free node
-  std::vector<Dependence> leastKind;  // per freedom: how its row of the mass matrix changes
+  std::vector<std::uint32_t> parent;                          // union-find over 6 freedoms of each free node
+  std::vector<Dependence> leastKind;                          // per freedom: how its row of the mass matrix changes
   std::vector<std::uint32_t> classOf, members, membersBegin;  // freedoms by class
   std::vector<Dependency> knowns;                             // of class c: [knownsBegin[c], knownsBegin[c+1])
   std::vector<std::size_t> knownsBegin;
-  std::vector<std::uint8_t> isDense;                          // its list is left out
+  std::vector<std::uint8_t> isDense;  // its list is left out
 
   Dependencies out;
   std::vector<Dependency> row;  // being collected

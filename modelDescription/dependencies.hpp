@@ -20,9 +20,9 @@ struct Dependency {
 
 // One row a value reference; rows of inputs and parameters are empty.
 struct Dependencies {
-  std::vector<std::size_t> begin;   // entries of value reference r: [begin[r], begin[r+1])
+  std::vector<std::size_t> begin;  // entries of value reference r: [begin[r], begin[r+1])
   std::vector<Dependency> entries;
-  std::vector<std::uint8_t> all;    // 1: the unknown is taken to depend on every known; its row is empty
+  std::vector<std::uint8_t> all;  // 1: the unknown is taken to depend on every known; its row is empty
 };
 
 Dependencies dependencies(const Model& model, const std::vector<Block>& blocks);

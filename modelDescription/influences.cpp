@@ -22,8 +22,7 @@ Influences::Influences(const Model& m, const Layout& l, const std::vector<Block>
   for (const Block& b : blocks) {
     references_ = b.reference + static_cast<std::uint32_t>(b.count());
     if (b.causality != Causality::input && b.causality != Causality::parameter) continue;
-    for (std::size_t i = 0; i < b.count(); ++i)
-      referenceAt[b.place + i] = b.reference + static_cast<std::uint32_t>(i);
+    for (std::size_t i = 0; i < b.count(); ++i) referenceAt[b.place + i] = b.reference + static_cast<std::uint32_t>(i);
     shapesChange |= b.field == Field::position && model.finite();
   }
   findMembers();
@@ -83,8 +82,7 @@ void Influences::addVelocity(List& to, Pattern left, int body) const {
 void Influences::addSpin(List& to, Pattern left, int body) const {
   const std::size_t port = portOf(body);
   if (port == none) return add(to, left, known(Field::spin, body));
-  if (body < model.rotating() || body >= model.nodes())
-    add(to, left, known(Field::portSpin, static_cast<int>(port)));
+  if (body < model.rotating() || body >= model.nodes()) add(to, left, known(Field::portSpin, static_cast<int>(port)));
 }
 
 void Influences::addAcceleration(List& to, Pattern left, int body) const {
@@ -103,13 +101,20 @@ void Influences::addAngularAcceleration(List& to, Pattern left, int body) const 
   if (body >= model.rotating() && body < model.nodes()) return;
   if (isFree(body)) return add(to, left, references_ + 6 * static_cast<std::uint32_t>(body - model.freeBegin()) + 3);
   const std::size_t port = portOf(body);
-  add(to, left, port == none ? known(Field::angularAcceleration, body)
-                             : known(Field::portAngularAcceleration, static_cast<int>(port)));
+  add(to, left,
+      port == none ? known(Field::angularAcceleration, body)
+                   : known(Field::portAngularAcceleration, static_cast<int>(port)));
 }
 
 Segment Influences::segment(const TieGroup& g, int e) const {
-  Segment s{g, &g.node[static_cast<std::size_t>(g.corners) * e], g.firstSlave + g.begin[e],
-            g.firstSlave + g.begin[e + 1], g.corners, {}, Mat3::Zero(), {}};
+  Segment s{g,
+            &g.node[static_cast<std::size_t>(g.corners) * e],
+            g.firstSlave + g.begin[e],
+            g.firstSlave + g.begin[e + 1],
+            g.corners,
+            {},
+            Mat3::Zero(),
+            {}};
   std::copy_n(s.node, g.corners, s.body);
   const std::size_t port = portOf(s.node[0]);
   if (port != none && std::all_of(s.node, s.node + g.corners, [&](int node) { return portOf(node) == port; })) {
@@ -238,14 +243,14 @@ void Influences::findSprings() {
 }
 
 void Influences::addSpring(const Spring& spring, const std::vector<List>& v, const std::vector<List>& w,
-                         const std::vector<List>& x) {
+                           const std::vector<List>& x) {
   struct Load { List force, moment; } a, b;
   const Pattern cross = moving(crossPattern), full = moving(fullPattern);
   const Pattern stiff = diagonalPattern(spring.stiffness), damped = diagonalPattern(spring.damping);
   const Pattern twisted = diagonalPattern(spring.rotationalDamping);
   const bool axial = spring.kind == SpringKind::axial;
-  const bool bTurns = spring.b.slave >= 0 ? spring.b.slave < model.turning()
-                                          : spring.b.node >= 0 && spring.b.node < model.rotating();
+  const bool bTurns =
+      spring.b.slave >= 0 ? spring.b.slave < model.turning() : spring.b.node >= 0 && spring.b.node < model.rotating();
   for (const SpringEnd* end : {&spring.a, &spring.b}) {
     List ev, ew, ex;
     if (end->slave >= 0) {
@@ -479,10 +484,14 @@ void Influences::addInertialLoads(const Segment& s) {
     const std::uint32_t massParameter = known(Field::slaveMass, slave, 1);
     const std::uint32_t inertiaParameter = known(Field::slaveInertia, slave, 1);
     Pattern m, own;
-    if (massParameter != noReference) m = changing(identityPattern);
-    else if (model.slaveMass[slave] != 0) m = identityPattern;
-    if (inertiaParameter != noReference) own = changing(identityPattern);
-    else if (slave < model.turning() && model.slaveInertia[slave] != 0) own = identityPattern;
+    if (massParameter != noReference)
+      m = changing(identityPattern);
+    else if (model.slaveMass[slave] != 0)
+      m = identityPattern;
+    if (inertiaParameter != noReference)
+      own = changing(identityPattern);
+    else if (slave < model.turning() && model.slaveInertia[slave] != 0)
+      own = identityPattern;
     if (m.empty() && own.empty()) continue;
     corners(s, slave, maps);
     for (int i = 0; i < n; ++i) {

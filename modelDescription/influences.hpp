@@ -27,9 +27,7 @@ inline void add(List& to, Pattern left, const List& from) {
 }
 
 // The part of one corner in the motion of a slave, THEORY 2: v_s += vv v + vw w, w_s += wv v + ww w.
-struct CornerMap {
-  Pattern vv, vw, wv, ww;
-};
+struct CornerMap { Pattern vv, vw, wv, ww; };
 
 // Bodies are the independent nodes and, numbered on from there, the ports of driven nodes. A segment whose corners all
 // belong to one port rides on that body alone.
@@ -39,7 +37,7 @@ struct Segment {
   int first, last;  // slaves
   int bodies;       // that move it: its corners, or one port
   int body[4];
-  Mat3 inverse;     // Ibar^-1 and arms at the start, where small displacements freeze them
+  Mat3 inverse;  // Ibar^-1 and arms at the start, where small displacements freeze them
   Vec3 arm[4];
 };
 
@@ -56,14 +54,16 @@ class Influences {
   Resultant resultant(std::size_t port, bool inertial) const;  // of everything on a port of driven nodes
   std::vector<Resultant> means;                                // velocity and spin of the ports of slaves
   // A pair of free nodes that the mass matrix couples (6 freedoms each, by blocks of 3).
-  struct Pair { int node, other; CornerMap mass; };
+  struct Pair {
+    int node, other;
+    CornerMap mass;
+  };
   std::vector<Pair> coupled;
 
   // Calls body(segment) in the order of slaves.
-  template <class Body>
-  void eachSegment(Body body) const;
-  void motion(const Segment& s, int slave, List& v, List& w, List& x) const;   // velocity, spin, position
-  void acceleration(const Segment& s, int slave, List& a) const;               // T q'' + b
+  template <class Body> void eachSegment(Body body) const;
+  void motion(const Segment& s, int slave, List& v, List& w, List& x) const;  // velocity, spin, position
+  void acceleration(const Segment& s, int slave, List& a) const;              // T q'' + b
 
   // Numbers above all references stand for the freedoms of free nodes' accelerations, which are unknowns themselves:
   // 6 a node, translations first.
@@ -86,7 +86,7 @@ class Influences {
   void addAngularAcceleration(List& to, Pattern left, int body) const;
   Pattern turning(const Vec3& arm) const;
   std::array<Pattern, 3> asOne(std::size_t port) const;
-  Pattern armOf(int node) const;  // of w in v + w x r of a port's node
+  Pattern armOf(int node) const;                                 // of w in v + w x r of a port's node
   CornerMap portMap(std::size_t port, std::size_t index) const;  // the part of one slave in the port's mean motion
   bool hasOffset(int slave) const { return !at(model.slaveOffset.data(), slave).isZero(0); }
   double weight(const Segment& s, int slave, int corner) const {
@@ -126,8 +126,7 @@ class Influences {
   std::vector<List> slaveForce, slaveMoment;  // of springs, on sprung slaves
 };
 
-template <class Body>
-void Influences::eachSegment(Body body) const {
+template <class Body> void Influences::eachSegment(Body body) const {
   for (const TieGroup& g : model.groups)
     for (int e = 0; e < g.segments(); ++e) body(segment(g, e));
 }

@@ -1,7 +1,7 @@
 #include "resource.hpp"
 
-#include <cereal/archives/portable_binary.hpp>
 #include <algorithm>
+#include <cereal/archives/portable_binary.hpp>
 #include <sstream>
 #include <type_traits>
 
@@ -25,13 +25,9 @@ class Writer {
  public:
   explicit Writer(std::ostream& stream)
       : archive(stream, cereal::PortableBinaryOutputArchive::Options::LittleEndian()) {}
-  template <class T>
-  void number(const T& value) {
-    archive(value);
-  }
+  template <class T> void number(const T& value) { archive(value); }
   // `+values`, no lvalue: of one cereal takes the size of the pointer for that of a number.
-  template <class T>
-  void numbers(const T* values, std::size_t count) {
+  template <class T> void numbers(const T* values, std::size_t count) {
     archive(cereal::binary_data(+values, count * sizeof(T)));
   }
   std::size_t size(std::size_t count) {
@@ -46,12 +42,8 @@ class Writer {
 class Reader {
  public:
   explicit Reader(std::string_view bytes) : view(bytes), stream(&view), archive(stream) {}
-  template <class T>
-  void number(T& value) {
-    archive(value);
-  }
-  template <class T>
-  void numbers(T* values, std::size_t count) {
+  template <class T> void number(T& value) { archive(value); }
+  template <class T> void numbers(T* values, std::size_t count) {
     archive(cereal::binary_data(+values, count * sizeof(T)));
   }
   // Count of elements of at least `bytesEach`; refused before anything is allocated for it.
@@ -85,34 +77,27 @@ void field(Archive& a, E& value) {
   value = static_cast<E>(number);  // its range is checked by checkModel
 }
 
-template <class Archive>
-void field(Archive& a, Vec3& value) {
-  a.numbers(value.data(), 3);
-}
+template <class Archive> void field(Archive& a, Vec3& value) { a.numbers(value.data(), 3); }
 
-template <class Archive>
-std::size_t length(Archive& a, std::size_t count, std::size_t bytesEach) {
+template <class Archive> std::size_t length(Archive& a, std::size_t count, std::size_t bytesEach) {
   if constexpr (std::is_same_v<Archive, Reader>)
     return a.size(count, bytesEach);
   else
     return a.size(count);
 }
 
-template <class Archive>
-void field(Archive& a, std::string& text) {
+template <class Archive> void field(Archive& a, std::string& text) {
   text.resize(length(a, text.size(), 1));
   a.numbers(text.data(), text.size());
 }
 
-template <class Archive>
-void field(Archive& a, SpringEnd& end) {
+template <class Archive> void field(Archive& a, SpringEnd& end) {
   field(a, end.node);
   field(a, end.slave);
   field(a, end.orientation);
 }
 
-template <class Archive>
-void field(Archive& a, Spring& s) {
+template <class Archive> void field(Archive& a, Spring& s) {
   field(a, s.a);
   field(a, s.b);
   field(a, s.kind);
@@ -121,22 +106,18 @@ void field(Archive& a, Spring& s) {
   field(a, s.length);
 }
 
-template <class Archive>
-void field(Archive& a, TieGroup& g);
+template <class Archive> void field(Archive& a, TieGroup& g);
 
-template <class Archive>
-void field(Archive& a, Port& p);
+template <class Archive> void field(Archive& a, Port& p);
 
-template <class Archive>
-void field(Archive& a, Finding& f) {
+template <class Archive> void field(Archive& a, Finding& f) {
   int kind = f.kind;
   field(a, kind);
   f.kind = kind == Finding::warning ? Finding::warning : Finding::note;
   field(a, f.text);
 }
 
-template <class Archive, class T>
-void field(Archive& a, std::vector<T>& values) {
+template <class Archive, class T> void field(Archive& a, std::vector<T>& values) {
   if constexpr (std::is_arithmetic_v<T>) {
     values.resize(length(a, values.size(), sizeof(T)));
     a.numbers(values.data(), values.size());
@@ -146,8 +127,7 @@ void field(Archive& a, std::vector<T>& values) {
   }
 }
 
-template <class Archive>
-void field(Archive& a, TieGroup& g) {
+template <class Archive> void field(Archive& a, TieGroup& g) {
   field(a, g.coupling);
   field(a, g.corners);
   field(a, g.firstSlave);
@@ -157,8 +137,7 @@ void field(Archive& a, TieGroup& g) {
   field(a, g.partEnd);
 }
 
-template <class Archive>
-void field(Archive& a, Port& p) {
+template <class Archive> void field(Archive& a, Port& p) {
   field(a, p.name);
   field(a, p.number);
   field(a, p.ofSlaves);
@@ -169,8 +148,7 @@ void field(Archive& a, Port& p) {
   field(a, p.orientation);
 }
 
-template <class Archive>
-void field(Archive& a, Settings& s) {
+template <class Archive> void field(Archive& a, Settings& s) {
   field(a, s.inertia);
   field(a, s.reaction);
   field(a, s.geometry);
@@ -185,8 +163,7 @@ void field(Archive& a, Settings& s) {
 }
 
 // Everything of a model but its tie report: an instance computes with all of it and shows none of that.
-template <class Archive>
-void field(Archive& a, Model& m) {
+template <class Archive> void field(Archive& a, Model& m) {
   field(a, m.settings);
   for (int& begin : m.begin) field(a, begin);
   field(a, m.nodeId);
@@ -196,8 +173,7 @@ void field(Archive& a, Model& m) {
     field(a, *v);
   field(a, m.slaveId);
   field(a, m.slaveNumber);
-  for (auto* v : {&m.slaveOffset, &m.slaveMass, &m.slaveInertia, &m.slaveStiffness,
-                  &m.slaveRotationalStiffness})
+  for (auto* v : {&m.slaveOffset, &m.slaveMass, &m.slaveInertia, &m.slaveStiffness, &m.slaveRotationalStiffness})
     field(a, *v);
   field(a, m.turningSlaves);
   field(a, m.groups);
@@ -212,8 +188,7 @@ void require(bool truth, const char* what) {
   if (!truth) throw ResourceError(std::string("scene: the model contradicts itself: ") + what);
 }
 
-template <class T>
-void requireSize(const std::vector<T>& values, std::size_t count, const char* what) {
+template <class T> void requireSize(const std::vector<T>& values, std::size_t count, const char* what) {
   require(values.size() == count, what);
 }
 
@@ -221,8 +196,7 @@ void requireFinite(const std::vector<double>& values, const char* what) {
   for (double v : values) require(std::isfinite(v), what);
 }
 
-template <class E>
-void requireEnum(E value, E last, const char* what) {
+template <class E> void requireEnum(E value, E last, const char* what) {
   require(static_cast<int>(value) <= static_cast<int>(last), what);
 }
 
@@ -266,8 +240,7 @@ void checkSlaves(const Model& m) {
   if (!m.slaveStiffness.empty()) requireSize(m.slaveStiffness, slaves, "slave stiffnesses");
   if (!m.slaveRotationalStiffness.empty())
     requireSize(m.slaveRotationalStiffness, slaves, "rotational slave stiffnesses");
-  for (const auto* v : {&m.slaveOffset, &m.slaveMass, &m.slaveInertia, &m.slaveStiffness,
-                        &m.slaveRotationalStiffness})
+  for (const auto* v : {&m.slaveOffset, &m.slaveMass, &m.slaveInertia, &m.slaveStiffness, &m.slaveRotationalStiffness})
     requireFinite(*v, "slave numbers that are not finite");
   for (int number : m.slaveNumber) require(number >= 1, "slave numbers");
 }
@@ -285,7 +258,8 @@ void checkGroups(const Model& m) {
     requireSize(g.weight, corners * slaves, "weights");
     requireFinite(g.weight, "weights that are not finite");
     require(!g.partEnd.empty() && std::is_sorted(g.partEnd.begin(), g.partEnd.end()) && g.partEnd.front() >= 0 &&
-                g.partEnd.back() <= g.segments(), "parts");
+                g.partEnd.back() <= g.segments(),
+            "parts");
     const int nodes = g.coupling == Coupling::rotation ? m.rotating() : m.nodes();
     for (int node : g.node) require(node >= 0 && node < nodes, "corners of segments");
     next += slaves;

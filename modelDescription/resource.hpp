@@ -15,9 +15,7 @@ struct Resource {
 };
 
 // Bytes that are not a resource of this program, or whose model contradicts itself. `what()` is one line.
-struct ResourceError : std::runtime_error {
-  using std::runtime_error::runtime_error;
-};
+struct ResourceError : std::runtime_error { using std::runtime_error::runtime_error; };
 
 // The same model and guid give the same bytes, on every platform.
 std::string writeResource(const Model& model, const std::string& guid);

@@ -18,7 +18,8 @@ struct Row {
 constexpr Row rows[] = {
     {"", "integrator.time_step", "integrator.time_step", false, 1, "s", "time step; 0: safety times the limit"},
     {"", "integrator.safety", "integrator.safety", false, 1, "1", "part of the limit that a time step may take"},
-    {"", "integrator.threads", "integrator.threads", false, 1, "1", "threads that share a step; results do not depend on it"},
+    {"", "integrator.threads", "integrator.threads", false, 1, "1",
+     "threads that share a step; results do not depend on it"},
     {"", "stable_time_step", "stable_time_step", false, 1, "s", "limit 2/omega_max of the assembled system"},
     {"", "nodal_time_step", "nodal_time_step", false, 1, "s", "smallest sqrt(2 m/K) of all master nodes"},
     {"", "energy.kinetic", "energy", true, 1, "J", "kinetic energy"},
@@ -69,8 +70,7 @@ bool contains(const std::vector<std::string>& list, std::string_view name) {
 }
 
 bool isDriven(int group) {
-  return group == rotatingDrivenMaster || group == rotatingDrivenPoint || group == drivenMaster ||
-         group == drivenPoint;
+  return group == rotatingDrivenMaster || group == rotatingDrivenPoint || group == drivenMaster || group == drivenPoint;
 }
 bool isFree(int group) { return group >= rotatingFreeMaster && group <= freePoint; }
 bool isRotating(int group) { return group < freeMaster; }
@@ -78,7 +78,9 @@ bool isRotating(int group) { return group < freeMaster; }
 class Table {
  public:
   Table(const Model& m, const Layout& l)
-      : model(m), layout(l), nodeInPort(static_cast<std::size_t>(m.nodes())),
+      : model(m),
+        layout(l),
+        nodeInPort(static_cast<std::size_t>(m.nodes())),
         slaveInPort(static_cast<std::size_t>(m.slaves())) {
     for (const Port& port : model.ports)
       for (int k : port.member) (port.ofSlaves ? slaveInPort : nodeInPort)[static_cast<std::size_t>(k)] = 1;
@@ -129,8 +131,7 @@ class Table {
   }
 
  private:
-  template <class Body>
-  static void eachRun(const std::vector<std::uint8_t>& without, int first, int last, Body body) {
+  template <class Body> static void eachRun(const std::vector<std::uint8_t>& without, int first, int last, Body body) {
     for (int i = first; i < last;) {
       int end = i;
       while (end < last && !without[static_cast<std::size_t>(end)]) ++end;
@@ -248,8 +249,7 @@ void addScalars(Table& table, const Model& model) {
     table.scalar("integrator.time_step", Field::timeStep, Causality::parameter);
     table.scalar("integrator.safety", Field::safety, Causality::parameter);
   }
-  if (model.settings.threads > 0)
-    table.scalar("integrator.threads", Field::threads, Causality::parameter);
+  if (model.settings.threads > 0) table.scalar("integrator.threads", Field::threads, Causality::parameter);
   if (model.anyFree()) {
     table.scalar("stable_time_step", Field::stableTimeStep, Causality::output);
     table.scalar("nodal_time_step", Field::nodalTimeStep, Causality::output);

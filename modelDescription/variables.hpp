@@ -16,12 +16,12 @@ enum class Causality { parameter, calculatedParameter, input, output };
 // `name` where prefix is empty. Ports have names in place of numbers: port[labels[e]].name[k+1]. Its value reference is
 // reference + e * components + k, its place in Simulation::data() is place + e * components + k.
 struct Block {
-  std::string prefix;        // "master", "slave", "point", "port" or ""
-  std::string name;          // "v", "f_ext", "stable_time_step", ...
-  int components = 1;        // 1 or 3
+  std::string prefix;  // "master", "slave", "point", "port" or ""
+  std::string name;    // "v", "f_ext", "stable_time_step", ...
+  int components = 1;  // 1 or 3
   Causality causality = Causality::output;
-  std::string unit;          // one of the unit table, e.g. "m/s"
-  std::string description;   // without the id; "(node ID)" or "(port NAME)" is appended per element
+  std::string unit;         // one of the unit table, e.g. "m/s"
+  std::string description;  // without the id; "(node ID)" or "(port NAME)" is appended per element
   Field field = Field::velocity;
   std::size_t place = 0;
   std::vector<int> numbers;

@@ -40,8 +40,7 @@ constexpr UnitRow units[] = {
 constexpr std::size_t mostStructuredNames = 10000;
 
 // Integers, and doubles as the shortest text that reads back to the same double.
-template <class Number>
-void appendNumber(std::string& out, Number number) {
+template <class Number> void appendNumber(std::string& out, Number number) {
   char text[32];
   out.append(text, std::to_chars(text, text + sizeof text, number).ptr);
 }
@@ -72,15 +71,13 @@ double fromText(const std::string& text) {
   return value;
 }
 
-struct Experiment {
-  double step, stop;
-};
+struct Experiment { double step, stop; };
 
 // A thousand steps: of 1 ms, or where the step has a limit, of one substep rounded down to 1, 2 or 5 times a power of
 // ten.
 Experiment defaultExperiment(const Model& model, const Simulation& simulation) {
-  double substep = model.settings.timeStep > 0 ? model.settings.timeStep
-                                               : model.settings.safety * simulation.integratorLimit();
+  double substep =
+      model.settings.timeStep > 0 ? model.settings.timeStep : model.settings.safety * simulation.integratorLimit();
   if (!model.anyFree() || substep > 1e6) substep = 1e-3;
   char text[32];  // like 9.87e-07; its decimals are exact where those of log10 and pow are not
   const char* end = std::to_chars(text, text + sizeof text, substep, std::chars_format::scientific).ptr;
@@ -102,8 +99,7 @@ std::vector<Place> listing(const std::vector<Block>& blocks) {
   for (std::uint32_t b = 0; b < blocks.size(); ++b) {
     const std::string& prefix = blocks[b].prefix;
     const int order = prefix.empty() ? 0 : prefix == "port" ? 1 : prefix == "master" ? 2 : prefix == "slave" ? 3 : 4;
-    for (std::uint32_t e = 0; e < blocks[b].numbers.size(); ++e)
-      places.push_back({order, blocks[b].numbers[e], b, e});
+    for (std::uint32_t e = 0; e < blocks[b].numbers.size(); ++e) places.push_back({order, blocks[b].numbers[e], b, e});
   }
   // Inputs and outputs stand before parameters, and otherwise in the order of memory.
   const auto rank = [&](const Place& p) {
@@ -168,8 +164,7 @@ void appendHead(std::string& out, const std::string& name, const std::string& ti
 
 void appendDefinitions(std::string& out) {
   out += "<UnitDefinitions>\n";
-  for (const UnitRow& u : units)
-    out += std::string("<Unit name=\"") + u.name + "\"><BaseUnit" + u.base + "/></Unit>\n";
+  for (const UnitRow& u : units) out += std::string("<Unit name=\"") + u.name + "\"><BaseUnit" + u.base + "/></Unit>\n";
   out += "</UnitDefinitions>\n<TypeDefinitions>\n";
   for (const UnitRow& u : units)
     out += std::string("<SimpleType name=\"") + u.quantity + "\"><Real quantity=\"" + u.quantity + "\" unit=\"" +
@@ -184,8 +179,7 @@ void appendDefinitions(std::string& out) {
   out += "</LogCategories>\n";
 }
 
-void appendVariables(Out& to, const std::vector<Block>& blocks, const std::vector<Place>& places,
-                     const double* start) {
+void appendVariables(Out& to, const std::vector<Block>& blocks, const std::vector<Place>& places, const double* start) {
   std::string& out = to.text();
   std::vector<std::string> tails;  // what every variable of a block has in common, up to the start value
   for (const Block& b : blocks) {
@@ -287,8 +281,8 @@ class Structure {
         out += ' ';
       }
       closeList(out);
-      // Without the kinds all are `dependent`. In initialisation the standard knows no `fixed`; and the lists are half of
-      // a large file.
+      // Without the kinds all are `dependent`. In initialisation the standard knows no `fixed`; and the lists are half
+      // of a large file.
       const auto plain = [](const Dependency& d) { return d.kind == Dependence::dependent; };
       if (!initial && !std::all_of(row.begin(), row.end(), plain)) {
         out += " dependenciesKind=\"";

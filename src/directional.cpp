@@ -6,17 +6,19 @@
 namespace tiefmu {
 
 struct Dynamics::Change {
-  std::vector<double> u, turn;               // nodes: a motion whose free part is zero
-  std::vector<double> v, w;                  // values to perturb the quadratic bias about
-  std::vector<double> xs, us, turns;         // slaves: positions, velocities
-  std::vector<double> load, moment;          // f_s
-  std::vector<double> node, nodeMoment;      // loads on nodes
+  std::vector<double> u, turn;           // nodes: a motion whose free part is zero
+  std::vector<double> v, w;              // values to perturb the quadratic bias about
+  std::vector<double> xs, us, turns;     // slaves: positions, velocities
+  std::vector<double> load, moment;      // f_s
+  std::vector<double> node, nodeMoment;  // loads on nodes
   std::vector<double> as, zs, other, otherTurn;
   std::vector<double> f, t, zero;
 
   explicit Change(const Model& model) {
-    const std::size_t n = 3 * static_cast<std::size_t>(model.nodes()), r = 3 * static_cast<std::size_t>(model.rotating());
-    const std::size_t s = 3 * static_cast<std::size_t>(model.slaves()), k = 3 * static_cast<std::size_t>(model.turning());
+    const std::size_t n = 3 * static_cast<std::size_t>(model.nodes()),
+                      r = 3 * static_cast<std::size_t>(model.rotating());
+    const std::size_t s = 3 * static_cast<std::size_t>(model.slaves()),
+                      k = 3 * static_cast<std::size_t>(model.turning());
     for (auto* a : {&u, &v, &node, &f}) a->resize(n);
     for (auto* a : {&turn, &w, &nodeMoment, &t}) a->resize(r);
     for (auto* a : {&xs, &us, &load, &as, &other, &zero}) a->resize(s);
@@ -26,9 +28,8 @@ struct Dynamics::Change {
 
 // Accelerations of the slaves change by T dq'' + (dT) q'' + db into change.as, zs. `v`, `w`: of the bias; its change
 // with the driven velocities du, dturn is half the difference between both sides, exact for a quadratic form.
-void Dynamics::changeAccelerations(Change& c, const double* da, const double* dz, const double* a,
-                                   const double* v, const double* w, const double* du, const double* dturn,
-                                   const double* dx) {
+void Dynamics::changeAccelerations(Change& c, const double* da, const double* dz, const double* a, const double* v,
+                                   const double* w, const double* du, const double* dturn, const double* dx) {
   eachGroup([&](const TieGroup& group, SegmentRange range, TieGeometry shape, std::size_t) {
     if (da) follow(group, range, shape, da, dz, c.as.data(), c.zs.data());
     if (dx && a) followChange(group, shape, dx, a, c.as.data(), c.zs.data());
@@ -67,8 +68,8 @@ void Dynamics::directional(double* dot) {
   const int turning = 3 * model.rotating();
   const bool consistent = model.settings.inertia == Inertia::consistent;
   const double *mass = field(Field::slaveMass), *inertia = field(Field::slaveInertia);
-  const double *a = has(Field::acceleration) ? field(Field::acceleration) : nullptr;
-  const double *z = field(Field::angularAcceleration);
+  const double* a = has(Field::acceleration) ? field(Field::acceleration) : nullptr;
+  const double* z = field(Field::angularAcceleration);
   const double *v = field(Field::velocity), *w = field(Field::spin);
   const double *du = seed(Field::velocity), *dturn = seed(Field::spin);
   const double* dx = nullptr;
@@ -208,10 +209,8 @@ void Dynamics::directional(double* dot) {
   if (ports.anyOfSlaves()) ports.mean(vs, ws, seed(Field::portMeanVelocity), seed(Field::portMeanSpin));
   if (has(Field::energy)) {
     double kinetic = 0;
-    for (int s = 0; s < model.slaves(); ++s)
-      kinetic += mass[s] * at(field(Field::slaveVelocity), s).dot(at(vs, s));
-    for (int s = 0; s < model.turning(); ++s)
-      kinetic += inertia[s] * at(field(Field::slaveSpin), s).dot(at(ws, s));
+    for (int s = 0; s < model.slaves(); ++s) kinetic += mass[s] * at(field(Field::slaveVelocity), s).dot(at(vs, s));
+    for (int s = 0; s < model.turning(); ++s) kinetic += inertia[s] * at(field(Field::slaveSpin), s).dot(at(ws, s));
     double* e = seed(Field::energy);
     e[0] = kinetic;
     e[1] = strain;

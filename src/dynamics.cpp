@@ -8,9 +8,7 @@
 namespace tiefmu {
 namespace {
 
-void fill(double* to, std::size_t count, const std::vector<double>& from) {
-  std::copy_n(from.begin(), count, to);
-}
+void fill(double* to, std::size_t count, const std::vector<double>& from) { std::copy_n(from.begin(), count, to); }
 
 std::string number(double value) {
   char text[32];
@@ -60,8 +58,10 @@ Dynamics::Dynamics(const Model& m, const Layout& l, double* d) : model(m), layou
     for (int e = 0; e < group.segments(); ++e) {
       const auto* first = holds.data() + group.firstSlave;
       if (std::none_of(first + group.begin[e], first + group.begin[e + 1], [](auto h) { return h; })) continue;
-      if (!sprung_.empty() && sprung_.back().group == g && sprung_.back().range.last == e) ++sprung_.back().range.last;
-      else sprung_.push_back({g, {e, e + 1}});
+      if (!sprung_.empty() && sprung_.back().group == g && sprung_.back().range.last == e)
+        ++sprung_.back().range.last;
+      else
+        sprung_.push_back({g, {e, e + 1}});
     }
   }
   if (springs || gravity_ || ports.anyOfSlaves()) {
@@ -171,8 +171,8 @@ void Dynamics::updateMass() {
 }
 
 void Dynamics::updateInertia() {
-  inertia_->update(model.nodeMass.data(), model.nodeInertia.data(), field(Field::slaveMass),
-                   field(Field::slaveInertia), field(Field::offset), frames_);
+  inertia_->update(model.nodeMass.data(), model.nodeInertia.data(), field(Field::slaveMass), field(Field::slaveInertia),
+                   field(Field::offset), frames_);
 }
 
 void Dynamics::updateGeometry() {
@@ -218,11 +218,14 @@ void Dynamics::placeSlaves(double* xs, bool sprungOnly) {
     // x_s = X_s + T (x - X): the start position, then the displacement on top.
     follow(group, range, shape, displacement_.data(), field(Field::angle), vs_.data(), ws_.data());
     place(group, range, shape, model.nodePosition.data(), xs);
-    for (int k = 3 * (group.firstSlave + group.begin[range.first]); k < 3 * (group.firstSlave + group.begin[range.last]); ++k)
+    for (int k = 3 * (group.firstSlave + group.begin[range.first]);
+         k < 3 * (group.firstSlave + group.begin[range.last]); ++k)
       xs[k] += vs_[k];
   };
-  if (sprungOnly) eachSprung(body);
-  else eachPart(body);
+  if (sprungOnly)
+    eachSprung(body);
+  else
+    eachPart(body);
 }
 
 const double* Dynamics::quaternion(int index) const {
@@ -288,8 +291,7 @@ void Dynamics::gatherLoads() {
   slaveLoad_ = load_.data();
   slaveMoment_ = moment_.data();
   if (gravity_)
-    for (int s = 0; s < model.slaves(); ++s)
-      at(load_.data(), s) += field(Field::slaveMass)[s] * model.settings.gravity;
+    for (int s = 0; s < model.slaves(); ++s) at(load_.data(), s) += field(Field::slaveMass)[s] * model.settings.gravity;
   if (xs_.empty()) return;
   if (has(Field::position)) placeSlaves(xs_.data(), true);
   if (ports.anyOfSlaves()) {
@@ -452,9 +454,8 @@ void Dynamics::movePorts() {
 
 // value += h rate
 void Dynamics::advance(std::size_t count, double h, const double* rate, double* value) {
-  eachBlock(count, [&](std::size_t first, std::size_t last) {
-    addScaled(last - first, h, rate + first, value + first);
-  });
+  eachBlock(count,
+            [&](std::size_t first, std::size_t last) { addScaled(last - first, h, rate + first, value + first); });
 }
 
 void Dynamics::kick(double h) {
@@ -483,7 +484,8 @@ void Dynamics::drift(double h, double ahead) {
     });
     for (std::size_t k = 0; k < model.oriented.size(); ++k) {
       const SpringEnd& end = model.oriented[k];
-      turnQuaternion(field(Field::orientation) + 4 * k, h * (end.node >= 0 ? Vec3(at(w, end.node)) : Vec3(at(ws_.data(), end.slave))));
+      turnQuaternion(field(Field::orientation) + 4 * k,
+                     h * (end.node >= 0 ? Vec3(at(w, end.node)) : Vec3(at(ws_.data(), end.slave))));
     }
   }
   const bool turns = has(Field::segmentRotation);
@@ -522,8 +524,10 @@ void Dynamics::rates(double* rate) {
   std::copy(a + 3 * model.freeBegin(), a + 3 * model.freeEnd(), of(Field::velocity) + 3 * model.freeBegin());
   std::copy(z + 3 * model.freeBegin(), z + 3 * model.rotating(), of(Field::spin) + 3 * model.freeBegin());
   if (has(Field::position)) {
-    if (drivenMove_) std::copy_n(v, layout[Field::position].count, of(Field::position));
-    else std::copy(v + 3 * model.freeBegin(), v + 3 * model.freeEnd(), of(Field::position) + 3 * model.freeBegin());
+    if (drivenMove_)
+      std::copy_n(v, layout[Field::position].count, of(Field::position));
+    else
+      std::copy(v + 3 * model.freeBegin(), v + 3 * model.freeEnd(), of(Field::position) + 3 * model.freeBegin());
   }
   std::copy_n(w, layout[Field::angle].count, of(Field::angle));
   if (offsetsTurn_ || !model.oriented.empty())
@@ -559,8 +563,7 @@ void Dynamics::rates(double* rate) {
 
 void Dynamics::normalise() {
   for (Field f : {Field::segmentRotation, Field::orientation})
-    for (std::size_t k = 0; k < layout[f].count; k += 4)
-      Eigen::Map<Eigen::Vector4d>(field(f) + k).normalize();
+    for (std::size_t k = 0; k < layout[f].count; k += 4) Eigen::Map<Eigen::Vector4d>(field(f) + k).normalize();
   if (!offsetsTurn_) return;
   for (const TieGroup& group : model.groups) {
     if (group.coupling != Coupling::rotation) continue;
@@ -660,8 +663,7 @@ Dynamics::Power Dynamics::power() {
   });
   for (int s = 0; s < model.slaves(); ++s)
     p.external += (at(field(Field::slaveForce), s) + field(Field::slaveMass)[s] * g).dot(at(vs_.data(), s));
-  for (int s = 0; s < model.turning(); ++s)
-    p.external += at(field(Field::slaveMoment), s).dot(at(ws_.data(), s));
+  for (int s = 0; s < model.turning(); ++s) p.external += at(field(Field::slaveMoment), s).dot(at(ws_.data(), s));
   if (ports.anyOfSlaves()) p.external += ports.power(vs_.data(), ws_.data());
   if (!model.anyDriven()) return p;
   // The driven nodes' part: what holds them against springs and tie, inertia included.

@@ -29,13 +29,13 @@ class Dynamics {
   double* field(Field f) { return data + layout[f].offset; }
   bool has(Field f) const { return layout[f].count > 0; }
 
-  void setStart();      // every field to its start value
-  void prepare();       // from the parameters: added inertia, stiffness, then prepareMass. Throws SceneError
-  void prepareMass();   // what stands beside the array: geometry and mass matrix. Throws SceneError
+  void setStart();     // every field to its start value
+  void prepare();      // from the parameters: added inertia, stiffness, then prepareMass. Throws SceneError
+  void prepareMass();  // what stands beside the array: geometry and mass matrix. Throws SceneError
   void updateGeometry();
-  void updateMass();    // the mass matrix at the present geometry, as `evaluate` does. Throws SceneError
-  // Node ids of a meanMotion segment whose nodes have come to lie on a line, so that its motion is not defined: "1, 2, 3".
-  // Empty: none.
+  void updateMass();  // the mass matrix at the present geometry, as `evaluate` does. Throws SceneError
+  // Node ids of a meanMotion segment whose nodes have come to lie on a line, so that its motion is not defined: "1, 2,
+  // 3". Empty: none.
   std::string collapsed();
 
   // Loads at the present geometry with `lagged` velocities in the dampers: T^T f_s into the reactions, then the free
@@ -93,9 +93,12 @@ class Dynamics {
   struct Change;
   void changeAccelerations(Change& change, const double* da, const double* dz, const double* a, const double* v,
                            const double* w, const double* du, const double* dturn, const double* dx);
-  struct Sprung { int group; SegmentRange range; };
+  struct Sprung {
+    int group;
+    SegmentRange range;
+  };
   TieGeometry geometry(std::size_t g) const;
-  template <class Body> void eachGroup(Body body) const;   // body(group, all its segments, geometry, index)
+  template <class Body> void eachGroup(Body body) const;  // body(group, all its segments, geometry, index)
   // The same, shared among threads: ranges that cover each group once. `body` may write what belongs to its segments.
   template <class Body> void eachPart(Body body) const;
   template <class Body> void eachSprung(Body body) const;  // the same for runs of segments whose slaves hold springs
@@ -116,37 +119,35 @@ class Dynamics {
   const double* spinFor(Field f) { return has(f) ? field(f) + 3 * model.nodes() : field(Field::spin); }
 
   std::vector<SegmentFrame> frames_;
-  std::vector<std::size_t> firstFrame_;           // per group
-  std::vector<double> inverseLength2_;            // per turning slave: 1/d0^2
-  std::vector<Sprung> sprung_;                    // segments whose slaves hold springs
-  std::vector<double> load_, moment_;             // f_s where it is more than the inputs
-  std::vector<double> nodeLoad_, nodeMoment_;     // on nodes from springs, inputs and gravity
-  std::vector<double> xs_, vs_, ws_;              // slaves, for springs
-  std::vector<double> tangent_, tangentMoment_;   // on slaves, from springOperator
-  std::vector<double> as_, zs_;                   // slaves' accelerations, or the loads of their inertia
-  std::vector<double> right_, rightMoment_;       // right side of the mass matrix
-  std::vector<double> step_, stepSpin_;           // velocities of a drift
-  std::vector<double> displacement_;              // small geometry: x - X
+  std::vector<std::size_t> firstFrame_;          // per group
+  std::vector<double> inverseLength2_;           // per turning slave: 1/d0^2
+  std::vector<Sprung> sprung_;                   // segments whose slaves hold springs
+  std::vector<double> load_, moment_;            // f_s where it is more than the inputs
+  std::vector<double> nodeLoad_, nodeMoment_;    // on nodes from springs, inputs and gravity
+  std::vector<double> xs_, vs_, ws_;             // slaves, for springs
+  std::vector<double> tangent_, tangentMoment_;  // on slaves, from springOperator
+  std::vector<double> as_, zs_;                  // slaves' accelerations, or the loads of their inertia
+  std::vector<double> right_, rightMoment_;      // right side of the mass matrix
+  std::vector<double> step_, stepSpin_;          // velocities of a drift
+  std::vector<double> displacement_;             // small geometry: x - X
   const double* slaveLoad_ = nullptr;
   const double* slaveMoment_ = nullptr;
-  const double* loadOnNodes_ = nullptr;           // `nodeLoad_`, or the inputs where nothing adds to them
+  const double* loadOnNodes_ = nullptr;  // `nodeLoad_`, or the inputs where nothing adds to them
   const double* momentOnNodes_ = nullptr;
   double strain_ = 0, dissipation_ = 0, turnRate_ = 0;
-  std::atomic<bool> sound_{true};                      // no kernel has met a collapsed segment since the last look
+  std::atomic<bool> sound_{true};  // no kernel has met a collapsed segment since the last look
   bool gravity_ = false, offsetsTurn_ = false, bias_ = false, knownAccelerations_ = false, drivenMove_ = true;
   std::unique_ptr<ConsistentInertia> inertia_;
   std::unique_ptr<Workers> workers_;  // none where one thread does it all
-  std::shared_ptr<Change> change_;  // scratch of `directional`, made at its first call
+  std::shared_ptr<Change> change_;    // scratch of `directional`, made at its first call
 };
 
-template <class Body>
-void Dynamics::eachGroup(Body body) const {
+template <class Body> void Dynamics::eachGroup(Body body) const {
   for (std::size_t g = 0; g < model.groups.size(); ++g)
     body(model.groups[g], SegmentRange{0, model.groups[g].segments()}, geometry(g), g);
 }
 
-template <class Body>
-void Dynamics::eachPart(Body body) const {
+template <class Body> void Dynamics::eachPart(Body body) const {
   if (!workers_) return eachGroup(body);
   for (std::size_t g = 0; g < model.groups.size(); ++g) {
     const TieGroup& group = model.groups[g];
@@ -158,18 +159,14 @@ void Dynamics::eachPart(Body body) const {
   }
 }
 
-template <class Body>
-void Dynamics::eachBlock(std::size_t count, Body body) const {
+template <class Body> void Dynamics::eachBlock(std::size_t count, Body body) const {
   constexpr std::size_t smallest = 4096, most = 64;
   const std::size_t blocks = workers_ ? std::clamp<std::size_t>(count / smallest, 1, most) : 1;
   if (blocks == 1) return body(std::size_t{0}, count);
-  workers_->each(static_cast<int>(blocks), [&](int k) {
-    body(count * k / blocks, count * (k + 1) / blocks);
-  });
+  workers_->each(static_cast<int>(blocks), [&](int k) { body(count * k / blocks, count * (k + 1) / blocks); });
 }
 
-template <class Body>
-void Dynamics::eachSprung(Body body) const {
+template <class Body> void Dynamics::eachSprung(Body body) const {
   for (const Sprung& s : sprung_) body(model.groups[s.group], s.range, geometry(s.group), s.group);
 }
 

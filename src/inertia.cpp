@@ -14,8 +14,7 @@ namespace {
 constexpr int smallSystem = 40;
 
 // Calls body(group, segment, slave (global), local slave) in order.
-template <class Body>
-void eachSlave(const Model& model, Body body) {
+template <class Body> void eachSlave(const Model& model, Body body) {
   for (const TieGroup& group : model.groups)
     for (int e = 0; e < group.segments(); ++e)
       for (int k = group.begin[e]; k < group.begin[e + 1]; ++k) body(group, e, group.firstSlave + k, k);
@@ -68,8 +67,7 @@ void nodalStiffness(const Model& model, double* translation, double* rotation) {
     const double stiffness = spring.stiffness.maxCoeff(), turning = spring.rotationalStiffness.maxCoeff();
     for (const SpringEnd* end : {&spring.a, &spring.b}) {
       // The second end of a bushing also carries the moment of the shear force.
-      const double arm2 =
-          spring.kind == SpringKind::bushing && end == &spring.b ? spring.arm.squaredNorm() : 0;
+      const double arm2 = spring.kind == SpringKind::bushing && end == &spring.b ? spring.arm.squaredNorm() : 0;
       if (end->slave >= 0) {
         k[end->slave] += stiffness;
         kr[end->slave] += turning + stiffness * arm2;

@@ -24,14 +24,13 @@ class Direct : public ConsistentInertia {
   void addSegments(const TieGroup& group, const std::vector<int>& slots, const double* slaveMass,
                    const double* slaveInertia, const double* offset, const SegmentFrame* frame);
   bool factor();
-  template <int m>
-  void substitute(double* x) const;
+  template <int m> void substitute(double* x) const;
 
-  int unknowns_, width_;                        // width_: 3, or 1 where components part
-  std::vector<int> position_;                   // unknown -> place in the factor's order
-  std::vector<int> columnBegin_, row_;          // upper triangle of blocks, by columns, in that order
-  std::vector<double> value_;                   // width_ squared per block, column by column
-  std::vector<std::vector<int>> slots_;         // per group: 2 * block + transposed for each pair of a segment, or -1
+  int unknowns_, width_;                 // width_: 3, or 1 where components part
+  std::vector<int> position_;            // unknown -> place in the factor's order
+  std::vector<int> columnBegin_, row_;   // upper triangle of blocks, by columns, in that order
+  std::vector<double> value_;            // width_ squared per block, column by column
+  std::vector<std::vector<int>> slots_;  // per group: 2 * block + transposed for each pair of a segment, or -1
   std::vector<int> parent_, factorBegin_, factorRow_, count_, flag_, stack_;
   std::vector<double> factorValue_, pivot_, row1_;  // L D L^T
   std::vector<double> x_;
@@ -48,7 +47,8 @@ Direct::Direct(const Model& model) : ConsistentInertia(model) {
 // Unknowns of a segment: the translations of its corners, then, for a rotation coupling, their rotations.
 void Direct::findPattern() {
   const auto unknown = [&](const TieGroup& group, int e, int local) {
-    const int node = group.node[static_cast<std::size_t>(group.corners) * e + local % group.corners] - model_.freeBegin();
+    const int node =
+        group.node[static_cast<std::size_t>(group.corners) * e + local % group.corners] - model_.freeBegin();
     if (node < 0 || node >= free_) return -1;
     return local < group.corners ? node : free_ + node;
   };
@@ -96,7 +96,8 @@ void Direct::findPattern() {
   const auto slot = [&](int a, int b) {
     if (a < 0 || b < 0) return -1;
     const int pa = position_[a], pb = position_[b], column = std::max(pa, pb), row = std::min(pa, pb);
-    const auto found = std::lower_bound(row_.begin() + columnBegin_[column], row_.begin() + columnBegin_[column + 1], row);
+    const auto found =
+        std::lower_bound(row_.begin() + columnBegin_[column], row_.begin() + columnBegin_[column + 1], row);
     return 2 * static_cast<int>(found - row_.begin()) + (pa > pb ? 1 : 0);
   };
   for (const TieGroup& group : model_.groups) {
@@ -185,8 +186,7 @@ bool Direct::factor() {
 }
 
 // m right sides side by side.
-template <int m>
-void Direct::substitute(double* x) const {
+template <int m> void Direct::substitute(double* x) const {
   using Right = Eigen::Matrix<double, m, 1>;
   const auto row = [&](int i) { return Eigen::Map<Right>(x + m * static_cast<std::ptrdiff_t>(i)); };
   const int size = unknowns_ * width_;
@@ -204,12 +204,14 @@ void Direct::substitute(double* x) const {
 void Direct::addBlock(int slot, const Mat3& block) {
   if (slot < 0) return;
   Eigen::Map<Mat3> target(&value_[9 * static_cast<std::size_t>(slot / 2)]);
-  if (slot % 2) target += block.transpose();
-  else target += block;
+  if (slot % 2)
+    target += block.transpose();
+  else
+    target += block;
 }
 
 void Direct::addSegments(const TieGroup& group, const std::vector<int>& slots, const double* slaveMass,
-                                    const double* slaveInertia, const double* offset, const SegmentFrame* frame) {
+                         const double* slaveInertia, const double* offset, const SegmentFrame* frame) {
   const int n = group.corners;
   const int* slot = slots.data();
   for (int e = 0; e < group.segments(); ++e) {
@@ -254,7 +256,8 @@ void Direct::addSegments(const TieGroup& group, const std::vector<int>& slots, c
             block += share * slaveMass[s] * Mat3::Identity();
           } else {
             const Vec3 d = at(offset, s);
-            if (p < n) block -= share * slaveMass[s] * skew(d);
+            if (p < n)
+              block -= share * slaveMass[s] * skew(d);
             else
               block += share * (slaveMass[s] * (d.squaredNorm() * Mat3::Identity() - d * d.transpose()) +
                                 slaveInertia[s] * Mat3::Identity());
@@ -266,8 +269,7 @@ void Direct::addSegments(const TieGroup& group, const std::vector<int>& slots, c
 }
 
 void Direct::update(const double* nodeMass, const double* nodeInertia, const double* slaveMass,
-                               const double* slaveInertia, const double* offset,
-                               const std::vector<SegmentFrame>& frames) {
+                    const double* slaveInertia, const double* offset, const std::vector<SegmentFrame>& frames) {
   std::fill(value_.begin(), value_.end(), 0.0);
   for (int i = 0; i < unknowns_; ++i) {
     const double own = i < free_ ? nodeMass[model_.freeBegin() + i] : nodeInertia[model_.freeBegin() + i - free_];
@@ -282,7 +284,8 @@ void Direct::update(const double* nodeMass, const double* nodeInertia, const dou
     if (group.coupling == Coupling::meanMotion) frame += group.segments();
   }
   if (factor()) return;
-  const int unknown = static_cast<int>(std::find(position_.begin(), position_.end(), stack_[0] / width_) - position_.begin());
+  const int unknown =
+      static_cast<int>(std::find(position_.begin(), position_.end(), stack_[0] / width_) - position_.begin());
   refuse(unknown < free_ ? unknown : unknown - free_, unknown >= free_);
 }
 
@@ -290,11 +293,15 @@ void Direct::solve(const double* force, const double* moment, double* a, double*
   for (int i = 0; i < unknowns_; ++i) {
     at(x_.data(), position_[i]) = i < free_ ? at(force, i) : at(moment, i - free_);
   }
-  if (width_ == 1) substitute<3>(x_.data());
-  else substitute<1>(x_.data());
+  if (width_ == 1)
+    substitute<3>(x_.data());
+  else
+    substitute<1>(x_.data());
   for (int i = 0; i < unknowns_; ++i) {
-    if (i < free_) at(a, i) = at(x_.data(), position_[i]);
-    else at(z, i - free_) = at(x_.data(), position_[i]);
+    if (i < free_)
+      at(a, i) = at(x_.data(), position_[i]);
+    else
+      at(z, i - free_) = at(x_.data(), position_[i]);
   }
 }
 

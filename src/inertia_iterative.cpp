@@ -39,30 +39,30 @@ bool invert(const Mat3& m, double* inverse) {
 // Two nodes' part of the matrix, 6x6 (or 3x3 where nothing rotates), as numbers in a row:
 //   [ A  -[c] ]    A: `vv` numbers, 1 (A = a 1, what the default formulation gives) or 9 (column by column);
 //   [[c]   W  ]    c: 3; W symmetric: xx xy xz yy yz zz
-template <int vv, bool turns>
-struct Block {
+template <int vv, bool turns> struct Block {
   static constexpr int size = vv + (turns ? 9 : 0), width = turns ? 6 : 3;
   using Vector = Eigen::Matrix<double, width, 1>;
   using Map = Eigen::Map<Vector>;
   using ConstMap = Eigen::Map<const Vector>;
 
-  template <bool transposed>
-  [[gnu::always_inline]] static Vec3 translation(const double* b, const Vec3& x) {
-    if constexpr (vv == 1) return b[0] * x;
-    else if constexpr (transposed) return Eigen::Map<const Mat3>(b).transpose() * x;
-    else return Eigen::Map<const Mat3>(b) * x;
+  template <bool transposed> [[gnu::always_inline]] static Vec3 translation(const double* b, const Vec3& x) {
+    if constexpr (vv == 1)
+      return b[0] * x;
+    else if constexpr (transposed)
+      return Eigen::Map<const Mat3>(b).transpose() * x;
+    else
+      return Eigen::Map<const Mat3>(b) * x;
   }
   // B x, or B^T x: the parts that rotate are symmetric as a whole.
-  template <bool transposed>
-  [[gnu::always_inline]] static Vector times(const double* b, const Vector& x) {
+  template <bool transposed> [[gnu::always_inline]] static Vector times(const double* b, const Vector& x) {
     if constexpr (!turns) {
       return translation<transposed>(b, x);
     } else {
       const double *c = b + vv, *w = b + vv + 3;
       const Vec3 v = x.template head<3>(), r = x.template tail<3>(), t = translation<transposed>(b, v);
       Vector y;
-      y << t.x() - c[1] * r.z() + c[2] * r.y(), t.y() - c[2] * r.x() + c[0] * r.z(), t.z() - c[0] * r.y() + c[1] * r.x(),
-          c[1] * v.z() - c[2] * v.y() + w[0] * r.x() + w[1] * r.y() + w[2] * r.z(),
+      y << t.x() - c[1] * r.z() + c[2] * r.y(), t.y() - c[2] * r.x() + c[0] * r.z(),
+          t.z() - c[0] * r.y() + c[1] * r.x(), c[1] * v.z() - c[2] * v.y() + w[0] * r.x() + w[1] * r.y() + w[2] * r.z(),
           c[2] * v.x() - c[0] * v.z() + w[1] * r.x() + w[3] * r.y() + w[4] * r.z(),
           c[0] * v.y() - c[1] * v.x() + w[2] * r.x() + w[4] * r.y() + w[5] * r.z();
       return y;
@@ -70,8 +70,7 @@ struct Block {
   }
 };
 
-template <int vv, bool turns>
-class Iterative : public ConsistentInertia {
+template <int vv, bool turns> class Iterative : public ConsistentInertia {
   using B = Block<vv, turns>;
   using Vector = typename B::Vector;
   static constexpr int width = B::width;
@@ -94,8 +93,10 @@ class Iterative : public ConsistentInertia {
     for (int i = 0; i < free_; ++i) {
       double* b = &diagonal_[B::size * static_cast<std::size_t>(place_[i])];
       const int node = model_.freeBegin() + i;
-      if constexpr (vv == 1) b[0] = nodeMass[node];
-      else b[0] = b[4] = b[8] = nodeMass[node];
+      if constexpr (vv == 1)
+        b[0] = nodeMass[node];
+      else
+        b[0] = b[4] = b[8] = nodeMass[node];
       if constexpr (turns) b[vv + 3] = b[vv + 6] = b[vv + 8] = i < freeRotating_ ? nodeInertia[node] : 1;
     }
     std::size_t frame = 0;
@@ -112,8 +113,10 @@ class Iterative : public ConsistentInertia {
       const double* b = &diagonal_[B::size * static_cast<std::size_t>(p)];
       Inverse& inverse = inverse_[p];
       Mat3 a = Mat3::Identity();
-      if constexpr (vv == 1) a *= b[0];
-      else a = Eigen::Map<const Mat3>(b);
+      if constexpr (vv == 1)
+        a *= b[0];
+      else
+        a = Eigen::Map<const Mat3>(b);
       if (!invert(a, inverse.translation)) refuse(nodeAt(p), false);
       if constexpr (turns) {
         const Mat3 c = skew(Vec3(b[vv], b[vv + 1], b[vv + 2]));
@@ -143,12 +146,14 @@ class Iterative : public ConsistentInertia {
   }
 
  private:
-  struct Inverse {  // of a diagonal block: A^-1, and that of W - [c]^T A^-1 [c]
+  struct Inverse {                       // of a diagonal block: A^-1, and that of W - [c]^T A^-1 [c]
     double translation[6], rotation[6];  // xx xy xz yy yz zz
   };
   // A slot: -1 where a corner is not free; -2 - p on the diagonal; else 2 * block + transposed.
 
-  int nodeAt(int place) const { return static_cast<int>(std::find(place_.begin(), place_.end(), place) - place_.begin()); }
+  int nodeAt(int place) const {
+    return static_cast<int>(std::find(place_.begin(), place_.end(), place) - place_.begin());
+  }
 
   int freeCorner(const TieGroup& group, int e, int corner) const {
     const int i = group.node[static_cast<std::size_t>(group.corners) * e + corner] - model_.freeBegin();
@@ -208,7 +213,8 @@ class Iterative : public ConsistentInertia {
       if (a < 0 || b < 0) return -1;
       const int pa = place_[a], pb = place_[b], row = std::min(pa, pb);
       if (pa == pb) return -2 - pa;
-      const auto found = std::lower_bound(column_.begin() + rowBegin_[row], column_.begin() + rowBegin_[row + 1], std::max(pa, pb));
+      const auto found =
+          std::lower_bound(column_.begin() + rowBegin_[row], column_.begin() + rowBegin_[row + 1], std::max(pa, pb));
       return 2 * static_cast<int>(found - column_.begin()) + (pa > pb ? 1 : 0);
     };
     for (const TieGroup& group : model_.groups) {
@@ -246,7 +252,8 @@ class Iterative : public ConsistentInertia {
             const double *d = offset + 3 * static_cast<std::size_t>(s), i = slaveInertia[s];
             const double mx = m * d[0], my = m * d[1], mz = m * d[2];
             const double xx = mx * d[0], yy = my * d[1], zz = mz * d[2];
-            const double all[10] = {m, mx, my, mz, yy + zz + i, -mx * d[1], -mx * d[2], xx + zz + i, -my * d[2], xx + yy + i};
+            const double all[10] = {m,          mx,         my,          mz,         yy + zz + i,
+                                    -mx * d[1], -mx * d[2], xx + zz + i, -my * d[2], xx + yy + i};
             std::copy_n(all, 10, x);
           }
         int pair = 0;
@@ -302,9 +309,12 @@ class Iterative : public ConsistentInertia {
           Mat3 block = spin[i].transpose() * right[j] - left[j];
           block.diagonal().array() += mass / (n * n);
           Eigen::Map<Mat3> b(target(*slot));
-          if (*slot < -1) b += i == j ? block : Mat3(block + block.transpose());
-          else if (*slot % 2) b += block.transpose();
-          else b += block;
+          if (*slot < -1)
+            b += i == j ? block : Mat3(block + block.transpose());
+          else if (*slot % 2)
+            b += block.transpose();
+          else
+            b += block;
         }
     }
   }
@@ -325,12 +335,13 @@ class Iterative : public ConsistentInertia {
   [[gnu::always_inline]] Vector ofDiagonal(int p, const Vector& x) const {
     return B::template times<false>(&diagonal_[B::size * static_cast<std::size_t>(p)], x);
   }
-  typename B::Map vector(std::vector<double>& v, int p) const { return typename B::Map(&v[static_cast<std::size_t>(width) * p]); }
+  typename B::Map vector(std::vector<double>& v, int p) const {
+    return typename B::Map(&v[static_cast<std::size_t>(width) * p]);
+  }
   const double* block(int k) const { return &value_[B::size * static_cast<std::size_t>(k)]; }
 
   // From the first node to the last u = right(node, (L u) of the node): solves (D + L) u = r.
-  template <class Right>
-  void forward(Right right, std::vector<double>& u) {
+  template <class Right> void forward(Right right, std::vector<double>& u) {
     for (int p = 0; p < free_; ++p) {
       const Vector y = right(p, vector(sweep_, p));
       vector(sweep_, p).setZero();  // for the next sweep
@@ -387,10 +398,12 @@ class Iterative : public ConsistentInertia {
           sum -= B::template times<false>(block(k), vector(scaled_, column_[k]));
         vector(scaled_, p) = ofInverse(p, sum);
       }
-      forward([&](int p, const Vector& sum) {
-        const Vector t = vector(scaled_, p);
-        return ofInverse(p, vector(direction_, p) - ofDiagonal(p, t) - sum);
-      }, image_);
+      forward(
+          [&](int p, const Vector& sum) {
+            const Vector t = vector(scaled_, p);
+            return ofInverse(p, vector(direction_, p) - ofDiagonal(p, t) - sum);
+          },
+          image_);
       const double curvature = dot(direction_, scaled_) + dot(direction_, image_);
       const double step = rho / curvature;
       const auto n = static_cast<Eigen::Index>(x_.size());
@@ -405,7 +418,7 @@ class Iterative : public ConsistentInertia {
   std::vector<int> rowBegin_, column_;    // blocks above the diagonal, by rows
   std::vector<double> value_, diagonal_;  // B::size numbers a block
   std::vector<Inverse> inverse_;
-  std::vector<std::vector<int>> slots_;   // per group
+  std::vector<std::vector<int>> slots_;  // per group
   std::vector<double> x_, rhs_, residual_, direction_, image_, scaled_, sweep_;
 };
 

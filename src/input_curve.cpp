@@ -7,8 +7,8 @@ void InputCurve::set(std::size_t place, int order, double value, const Layout& l
   int& index = index_[place];
   if (index == 0) {
     const auto in = [&](Field f) { return place >= layout[f].offset && place < layout[f].offset + layout[f].count; };
-    entries_.push_back({{place, 0, 0}, in(Field::velocity) || in(Field::spin) || in(Field::portVelocity) ||
-                                            in(Field::portSpin), 0});
+    entries_.push_back(
+        {{place, 0, 0}, in(Field::velocity) || in(Field::spin) || in(Field::portVelocity) || in(Field::portSpin), 0});
     index = static_cast<int>(entries_.size());
   }
   (order == 1 ? entries_[index - 1].first : entries_[index - 1].second) = value;

@@ -24,12 +24,12 @@ class InputCurve {
   std::vector<InputDerivatives> all() const { return {entries_.begin(), entries_.end()}; }
   void assign(const std::vector<InputDerivatives>& derivatives, const Layout& layout);
 
-  void begin(const double* data);                          // tau = 0: the inputs as they stand
-  void at(double tau, double* data) const;                 // inputs at tau
+  void begin(const double* data);           // tau = 0: the inputs as they stand
+  void at(double tau, double* data) const;  // inputs at tau
   // The vector at `place`, at tau and its mean over [tau, tau + h], whatever `data` holds of what moves.
   Vec3 at(std::size_t place, double tau, const double* data) const;
   Vec3 mean(std::size_t place, double tau, double h, const double* data) const;
-  void over(double tau, double h, double* data) const;     // velocities and spins at their mean over [tau, tau + h]
+  void over(double tau, double h, double* data) const;  // velocities and spins at their mean over [tau, tau + h]
 
  private:
   struct Entry : InputDerivatives {

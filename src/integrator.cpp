@@ -60,9 +60,7 @@ bool Integrator::step(double tau, double h) {
       d.kick(nohBathe::q2 * h2);
       return true;
     }
-    case Method::rk4:
-      rungeKutta(tau, h);
-      return false;
+    case Method::rk4: rungeKutta(tau, h); return false;
   }
   return false;
 }
@@ -82,7 +80,8 @@ void Integrator::rungeKutta(double tau, double h) {
       d.evaluate();
     }
     d.rates(rates_.data());
-    if (stage == 0) std::copy(rates_.begin(), rates_.end(), sum_.begin());
+    if (stage == 0)
+      std::copy(rates_.begin(), rates_.end(), sum_.begin());
     else
       for (std::size_t k = 0; k < size; ++k) sum_[k] += weight[stage] * rates_[k];
   }

@@ -19,8 +19,9 @@ class Integrator {
  public:
   explicit Integrator(Dynamics& dynamics);
 
-  // From t to t + h; `tau` is the time since the inputs were set, s. On entry the accelerations belong to the present state and inputs. Returns whether they do so
-  // again on exit (central difference, Noh-Bathe) or must be evaluated anew (symplectic Euler, RK4).
+  // From t to t + h; `tau` is the time since the inputs were set, s. On entry the accelerations belong to the present
+  // state and inputs. Returns whether they do so again on exit (central difference, Noh-Bathe) or must be evaluated
+  // anew (symplectic Euler, RK4).
   bool step(double tau, double h);
 
  private:

@@ -26,7 +26,7 @@ inline Mat3 skew(const Vec3& u) {
 // Unit quaternion of the rotation vector `angle` (rad): the exponential map of SO(3), exact for any angle.
 inline Quat exponential(const Vec3& angle) {
   const double half2 = 0.25 * angle.squaredNorm();
-  double c, s;  // cos|angle/2| and sin|angle/2| / |angle/2|
+  double c, s;         // cos|angle/2| and sin|angle/2| / |angle/2|
   if (half2 < 1e-2) {  // Taylor: the next terms are below 1e-17
     c = 1 - half2 / 2 * (1 - half2 / 12 * (1 - half2 / 30 * (1 - half2 / 56 * (1 - half2 / 90))));
     s = 1 - half2 / 6 * (1 - half2 / 20 * (1 - half2 / 42 * (1 - half2 / 72 * (1 - half2 / 110))));

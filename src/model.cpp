@@ -61,13 +61,13 @@ class Compiler {
  private:
   const Scene& scene;
   Model model;
-  std::vector<int> tieOf;             // per scene node: the tie it is a slave of, or -1
+  std::vector<int> tieOf;  // per scene node: the tie it is a slave of, or -1
   std::vector<Bond> bonds;
-  std::vector<std::uint8_t> bound;    // per scene node: is a slave of the model
-  std::vector<std::uint8_t> master;   // per scene node
-  std::vector<std::uint8_t> turns;    // per scene node: rotational freedom that the model keeps
+  std::vector<std::uint8_t> bound;         // per scene node: is a slave of the model
+  std::vector<std::uint8_t> master;        // per scene node
+  std::vector<std::uint8_t> turns;         // per scene node: rotational freedom that the model keeps
   std::vector<int> nodeIndex, slaveIndex;  // per scene node: index in the model, or -1
-  std::vector<int> segmentRotation;   // per slave of the model: index of its meanMotion segment, or -1
+  std::vector<int> segmentRotation;        // per slave of the model: index of its meanMotion segment, or -1
   std::vector<std::vector<int>> partEnds;  // per group
   std::vector<int> orientationOfSlave, orientationOfNode;  // per slave and node of the model: quaternion, or -1
   int meanMotionSegments = 0;
@@ -99,8 +99,8 @@ class Compiler {
         for (int i = 0; i < corners(e); ++i) {
           const int node = scene.segments.nodes[e][i];
           if (tieOf[node] >= 0)
-            throw SceneError(tie(tieOf[node]) + "slave " + id(node) + ": is also a master, on segment " +
-                             segmentId(e) + " of tie '" + scene.ties[t].name + "'; take it out of one of them");
+            throw SceneError(tie(tieOf[node]) + "slave " + id(node) + ": is also a master, on segment " + segmentId(e) +
+                             " of tie '" + scene.ties[t].name + "'; take it out of one of them");
         }
   }
 
@@ -155,8 +155,8 @@ class Compiler {
       line += "; it lies outside every segment by more than half its size";
     if (!passedOver.empty()) line += "; without area and passed over: segment " + passedOver;
     if (match.unconverged >= 0)
-      line += "; the projection on segment " + segmentId(scene.ties[t].segments[match.unconverged]) +
-              " did not converge";
+      line +=
+          "; the projection on segment " + segmentId(scene.ties[t].segments[match.unconverged]) + " did not converge";
     if (!scene.ties[t].dropUnresolved) throw SceneError(line);
     warn(line + "; dropped");
     model.dropped.push_back({scene.nodes.id[s], t, line.substr(line.find("no segment"))});
@@ -189,9 +189,8 @@ class Compiler {
         b.coupling = Coupling::meanMotion;
         b.offset = scene.nodes.position[b.slave] - inertia.centre;
         if (!(inertia.condition <= conditionRefused))
-          throw SceneError(onSegment + "cannot hold slave " + id(b.slave) +
-                           ": its nodes are collinear (cond(Ibar) = " + text(inertia.condition) +
-                           ", at most 1e12), which leaves the rotation about them open");
+          throw SceneError(onSegment + "cannot hold slave " + id(b.slave) + ": its nodes are collinear (cond(Ibar) = " +
+                           text(inertia.condition) + ", at most 1e12), which leaves the rotation about them open");
         if (inertia.condition > conditionWarned && !toldCondition[b.segment]) {
           toldCondition[b.segment] = 1;
           warn(onSegment + "its nodes are nearly collinear: cond(Ibar) = " + text(inertia.condition));
@@ -256,8 +255,10 @@ class Compiler {
         if (end >= 0 && !bound[end] && !master[end]) point[end] = 1;
     std::vector<int> used;
     for (int node = 0; node < static_cast<int>(all.id.size()); ++node) {
-      if (master[node] || point[node]) used.push_back(node);
-      else if (!bound[node]) model.leftOut.push_back(all.id[node]);
+      if (master[node] || point[node])
+        used.push_back(node);
+      else if (!bound[node])
+        model.leftOut.push_back(all.id[node]);
     }
     std::sort(model.leftOut.begin(), model.leftOut.end());
     std::sort(used.begin(), used.end(), [&](int a, int b) { return all.id[a] < all.id[b]; });
@@ -322,7 +323,9 @@ class Compiler {
     const int count = static_cast<int>(bonds.size());
     for (int first = 0, last = 0; first < count; first = last) {
       std::vector<int> node, segmentOf;  // segmentOf: per bond of the group, counted within it
-      for (; last < count && bonds[last].coupling == bonds[first].coupling && bonds[last].corners == bonds[first].corners; ++last) {
+      for (;
+           last < count && bonds[last].coupling == bonds[first].coupling && bonds[last].corners == bonds[first].corners;
+           ++last) {
         const Bond& b = bonds[last];
         if (last == first || b.segment != bonds[last - 1].segment)
           for (int i = 0; i < b.corners; ++i) node.push_back(nodeIndex[scene.segments.nodes[b.segment][i]]);
@@ -429,8 +432,10 @@ class Compiler {
       Spring spring{};
       for (const auto& [node, end] : {std::pair{spec.a, &spring.a}, std::pair{spec.b, &spring.b}}) {
         if (node < 0) continue;
-        if (bound[node]) end->slave = slaveIndex[node];
-        else end->node = nodeIndex[node];
+        if (bound[node])
+          end->slave = slaveIndex[node];
+        else
+          end->node = nodeIndex[node];
       }
       const bool ground = spec.b < 0;
       if (!ground && spec.a == spec.b) throw SceneError(where + "node " + id(spec.a) + " is joined to itself");
@@ -445,7 +450,8 @@ class Compiler {
       spring.length = spring.arm.norm();
       if (spec.kind == SpringKind::axial) {
         if (ground)
-          throw SceneError(where + "node " + id(spec.a) + ": an axial spring to its own start position has no "
+          throw SceneError(where + "node " + id(spec.a) +
+                           ": an axial spring to its own start position has no "
                            "direction; use kind = \"bushing\"");
         if (!(spring.length > 0))
           throw SceneError(where + "nodes " + id(spec.a) + " and " + id(spec.b) +
@@ -458,7 +464,8 @@ class Compiler {
             orient(*end);
           }
         if (!ground && spring.length > 0) {
-          if (canTurn(spring.b)) orient(spring.b);
+          if (canTurn(spring.b))
+            orient(spring.b);
           else if (!fixedNode(spring.b))
             warn(where + (bound[spec.b] ? "slave " : "node ") + id(spec.b) +
                  " cannot turn: the moment of the shear force over the distance " + text(spring.length) +
@@ -477,7 +484,8 @@ class Compiler {
 
   std::string cannotTurn(int node, const SpringEnd& end) const {
     if (end.slave < 0)
-      return "node " + id(node) + " has no rotations for the rotational stiffness or damping to act on; "
+      return "node " + id(node) +
+             " has no rotations for the rotational stiffness or damping to act on; "
              "give it rotations = true";
     const Bond& b = bonds[end.slave];
     return "slave " + id(node) + " cannot take a moment: the nodes of segment " + segmentId(b.segment) + " of tie '" +
@@ -511,8 +519,8 @@ class Compiler {
     port.ofSlaves = slave >= 0;
     if (port.ofSlaves != ofSlaves) return;
     if (port.member.size() < spec.nodes.size())
-      note(where + std::to_string(spec.nodes.size() - port.member.size()) + " of " +
-           std::to_string(spec.nodes.size()) + " nodes left out: no tie and no spring uses them");
+      note(where + std::to_string(spec.nodes.size() - port.member.size()) + " of " + std::to_string(spec.nodes.size()) +
+           " nodes left out: no tie and no spring uses them");
     std::sort(port.member.begin(), port.member.end());
     const auto position = [&](int member) {
       return port.ofSlaves ? scene.nodes.position[bonds[member].slave] : Vec3(at(model.nodePosition.data(), member));
@@ -525,8 +533,10 @@ class Compiler {
       const Vec3 arm = position(member) - (port.ofSlaves ? mean : port.place);
       port.arm.insert(port.arm.end(), arm.begin(), arm.end());
     }
-    if (port.ofSlaves) resolveTurn(port, where);
-    else startMotion(port, where);
+    if (port.ofSlaves)
+      resolveTurn(port, where);
+    else
+      startMotion(port, where);
     model.ports.push_back(std::move(port));
   }
 
@@ -534,8 +544,8 @@ class Compiler {
   void resolveTurn(Port& port, const std::string& where) {
     const Vec3 eigenvalue = armInertia(port.arm).selfadjointView<Eigen::Lower>().eigenvalues();
     if (eigenvalue[0] * conditionRefused >= eigenvalue[2] && eigenvalue[2] > 0) return;
-    const bool turning = std::any_of(port.member.begin(), port.member.end(),
-                                     [&](int s) { return s < model.turningSlaves; });
+    const bool turning =
+        std::any_of(port.member.begin(), port.member.end(), [&](int s) { return s < model.turningSlaves; });
     if (!turning)
       throw SceneError(where + (port.member.size() > 1 ? "its slaves are collinear and" : "its only slave") +
                        " cannot turn, which leaves its rotation open; use formulation = \"optimized\" or "
@@ -567,8 +577,10 @@ class Compiler {
       turn += at(arm.data(), i).cross(at(model.nodeVelocity.data(), port.member[i]));
     }
     const int rotating = *std::min_element(port.member.begin(), port.member.end());
-    if (rotating < model.rotating()) port.spin = at(model.nodeSpin.data(), rotating);
-    else if (!turn.isZero(0)) port.spin = armInertia(arm).completeOrthogonalDecomposition().solve(turn);
+    if (rotating < model.rotating())
+      port.spin = at(model.nodeSpin.data(), rotating);
+    else if (!turn.isZero(0))
+      port.spin = armInertia(arm).completeOrthogonalDecomposition().solve(turn);
     port.velocity = meanVelocity - port.spin.cross(meanArm);
     for (std::size_t i = 0; i < count; ++i) {
       const int node = port.member[i];
@@ -591,9 +603,10 @@ class Compiler {
         drivenCorner |= motion == Motion::driven;
       }
       if (freeCorner && drivenCorner && scene.nodes.mass[b.slave] + scene.nodes.inertia[b.slave] > 0) {
-        warn("model: reaction 'loads' gives no accelerations of the driven masters, so their share of the slaves' "
-             "inertia does not act on the free masters of the same segment (first: segment " + segmentId(b.segment) +
-             "); reaction = \"full\" or \"split\" does");
+        warn(
+            "model: reaction 'loads' gives no accelerations of the driven masters, so their share of the slaves' "
+            "inertia does not act on the free masters of the same segment (first: segment " +
+            segmentId(b.segment) + "); reaction = \"full\" or \"split\" does");
         return;
       }
     }
@@ -627,7 +640,8 @@ bool Model::needsPositions() const {
   if (!finite()) return false;
   for (const Port& port : ports)
     if (port.ofSlaves && port.member.size() > 1) return true;
-  return std::any_of(groups.begin(), groups.end(), [](const TieGroup& g) { return g.coupling == Coupling::meanMotion; });
+  return std::any_of(groups.begin(), groups.end(),
+                     [](const TieGroup& g) { return g.coupling == Coupling::meanMotion; });
 }
 
 Model compile(const Scene& scene) { return Compiler(scene).run(); }

@@ -17,19 +17,30 @@ namespace tiefmu {
 // come first and free ones stand together, so that every array below is a contiguous slice of its field:
 // rotating = [0, begin[freeMaster]), free = [begin[rotatingFreeMaster], begin[fixedMaster]).
 enum NodeGroup : int {
-  rotatingDrivenMaster, rotatingDrivenPoint, rotatingFixedMaster, rotatingFixedPoint, rotatingFreeMaster,
-  rotatingFreePoint, freeMaster, freePoint, fixedMaster, fixedPoint, drivenMaster, drivenPoint, nodeGroups
+  rotatingDrivenMaster,
+  rotatingDrivenPoint,
+  rotatingFixedMaster,
+  rotatingFixedPoint,
+  rotatingFreeMaster,
+  rotatingFreePoint,
+  freeMaster,
+  freePoint,
+  fixedMaster,
+  fixedPoint,
+  drivenMaster,
+  drivenPoint,
+  nodeGroups
 };
 
 // Slaves of one coupling on segments of one shape, contiguous in every slave array and grouped by segment.
 struct TieGroup {
   Coupling coupling;
-  int corners;     // 4 or 3
-  int firstSlave;  // index of the group's first slave in the slave arrays
-  std::vector<int> node;        // corners per segment: independent node indices
-  std::vector<int> begin;       // segments + 1: slaves of segment e are firstSlave + [begin[e], begin[e+1])
-  std::vector<double> weight;   // corners per slave: Phi at the projection
-  std::vector<int> partEnd;     // parts end at these segments, share no node and are followed by their border
+  int corners;                 // 4 or 3
+  int firstSlave;              // index of the group's first slave in the slave arrays
+  std::vector<int> node;       // corners per segment: independent node indices
+  std::vector<int> begin;      // segments + 1: slaves of segment e are firstSlave + [begin[e], begin[e+1])
+  std::vector<double> weight;  // corners per slave: Phi at the projection
+  std::vector<int> partEnd;    // parts end at these segments, share no node and are followed by their border
   int segments() const { return static_cast<int>(begin.size()) - 1; }
   int slaves() const { return begin.back(); }
 };
@@ -82,9 +93,9 @@ struct Dropped {  // a slave that its tie's search did not find
 struct SlaveReport {
   std::int64_t segment = 0;  // id
   double xi = 0, eta = 0;
-  double distance = 0;       // slave to its projection, m
+  double distance = 0;  // slave to its projection, m
   int tie = 0;
-  bool clamped = false;      // its inertia uses the projection clamped to the segment
+  bool clamped = false;  // its inertia uses the projection clamped to the segment
 };
 
 struct Model {
@@ -93,32 +104,32 @@ struct Model {
   // independent nodes, sorted by group
   std::array<int, nodeGroups + 1> begin{};
   std::vector<std::int64_t> nodeId;
-  std::vector<int> nodeNumber;  // i of master[i], p of point[p]: from 1 by ascending id
+  std::vector<int> nodeNumber;                     // i of master[i], p of point[p]: from 1 by ascending id
   std::vector<double> nodePosition, nodeVelocity;  // 3 per node
   std::vector<double> nodeSpin;                    // 3 per rotating node
   std::vector<double> nodeMass, nodeInertia, nodeStiffness, nodeRotationalStiffness;
 
   // slaves: turning ones (rotation, meanMotion) first
   std::vector<std::int64_t> slaveId;
-  std::vector<int> slaveNumber;            // j of slave[j]: from 1 by ascending id
-  std::vector<double> slaveOffset;         // 3 per slave: d at the start
+  std::vector<int> slaveNumber;     // j of slave[j]: from 1 by ascending id
+  std::vector<double> slaveOffset;  // 3 per slave: d at the start
   std::vector<double> slaveMass, slaveInertia;
   std::vector<double> slaveStiffness, slaveRotationalStiffness;  // empty where no slave declares any
-  int turningSlaves = 0;                   // how many can turn
-  std::vector<TieGroup> groups;            // in slave order: rotation, meanMotion, translation; quads before triangles
+  int turningSlaves = 0;                                         // how many can turn
+  std::vector<TieGroup> groups;  // in slave order: rotation, meanMotion, translation; quads before triangles
 
   std::vector<Spring> springs;
-  std::vector<SpringEnd> oriented;         // ends whose rotation is tracked as a unit quaternion
+  std::vector<SpringEnd> oriented;  // ends whose rotation is tracked as a unit quaternion
 
-  std::vector<Port> ports;                 // those of driven nodes first
+  std::vector<Port> ports;  // those of driven nodes first
 
   // what the report says
   std::vector<std::string> tieName;
-  std::vector<double> searchDistance;      // per tie: as given, or the default, m
-  std::vector<SlaveReport> slaveReport;    // in slave order
+  std::vector<double> searchDistance;    // per tie: as given, or the default, m
+  std::vector<SlaveReport> slaveReport;  // in slave order
   std::vector<Finding> findings;
   std::vector<Dropped> dropped;
-  std::vector<std::int64_t> leftOut;       // nodes that no tie and no spring uses
+  std::vector<std::int64_t> leftOut;  // nodes that no tie and no spring uses
 
   int nodes() const { return begin[nodeGroups]; }
   int rotating() const { return begin[freeMaster]; }
@@ -133,9 +144,9 @@ struct Model {
   bool isMaster(int group) const { return group % 2 == 0; }
   bool exposes(const char* name) const;  // is this name of INTERFACE's expose list asked for?
 
-  bool needsPositions() const;     // node positions are states (or inputs)
+  bool needsPositions() const;  // node positions are states (or inputs)
   bool finite() const { return settings.geometry == Geometry::finite; }
-  bool shareable() const;          // large enough that threads find parts to share
+  bool shareable() const;  // large enough that threads find parts to share
   bool accelerationInputs() const { return settings.reaction != Reaction::loads; }
 };
 

@@ -14,9 +14,7 @@ std::vector<int> localOrder(const std::vector<Vec3>& points);
 // Segments (`corners` node indices each, by index in the model) split in parts of which no two touch a common node, and
 // a border that may touch any. `order`: the parts' segments one part after the other, then the border's; `end`: where
 // each part ends, the last at the beginning of the border. How many parts follows from the number of segments alone.
-struct Parts {
-  std::vector<int> order, end;
-};
+struct Parts { std::vector<int> order, end; };
 Parts split(const std::vector<int>& node, int corners);
 
 }  // namespace tiefmu

@@ -1,5 +1,5 @@
-// A vector of three in SIMD registers, and four numbers side by side. Every operation rounds alike in each build, so that
-// results do not depend on the machine.
+// A vector of three in SIMD registers, and four numbers side by side. Every operation rounds alike in each build, so
+// that results do not depend on the machine.
 #pragma once
 
 #include <cstddef>
@@ -36,8 +36,7 @@ TIEFMU_INLINE Pack operator*(Pack a, Pack b) { return {a.v * b.v}; }
 TIEFMU_INLINE Pack operator*(double s, Pack a) { return {_mm256_set1_pd(s) * a.v}; }
 TIEFMU_INLINE Pack operator/(Pack a, double s) { return {a.v / _mm256_set1_pd(s)}; }
 TIEFMU_INLINE Pack yzx(Pack a) { return {_mm256_permute4x64_pd(a.v, 0xC9)}; }
-template <int K>
-TIEFMU_INLINE Pack lane(Pack a) { return {_mm256_permute4x64_pd(a.v, 0x55 * K)}; }  // (a_K, a_K, a_K)
+template <int K> TIEFMU_INLINE Pack lane(Pack a) { return {_mm256_permute4x64_pd(a.v, 0x55 * K)}; }  // (a_K, a_K, a_K)
 #else
 // x, y in one register and z in another, which baseline x86-64 (and every other 16-byte vector unit) serves.
 using Pair = double __attribute__((vector_size(16)));
@@ -61,8 +60,7 @@ TIEFMU_INLINE Pack operator*(Pack a, Pack b) { return {a.xy * b.xy, a.z * b.z}; 
 TIEFMU_INLINE Pack operator*(double s, Pack a) { return {s * a.xy, s * a.z}; }
 TIEFMU_INLINE Pack operator/(Pack a, double s) { return {a.xy / s, a.z / s}; }
 TIEFMU_INLINE Pack yzx(Pack a) { return {Pair{a.xy[1], a.z}, a.xy[0]}; }
-template <int K>
-TIEFMU_INLINE Pack lane(Pack a) { return {Pair{a[K], a[K]}, a[K]}; }
+template <int K> TIEFMU_INLINE Pack lane(Pack a) { return {Pair{a[K], a[K]}, a[K]}; }
 #endif
 
 TIEFMU_INLINE Pack& operator+=(Pack& a, Pack b) { return a = a + b; }
@@ -73,9 +71,7 @@ TIEFMU_INLINE double dot(Pack a, Pack b) {
   const Pack p = a * b;
   return p[0] + p[1] + p[2];
 }
-struct Columns {
-  Pack x, y, z;
-};
+struct Columns { Pack x, y, z; };
 TIEFMU_INLINE Columns loadColumns(const double* m) { return {load(m), load(m + 3), load(m + 6)}; }
 TIEFMU_INLINE Pack operator*(const Columns& m, Pack a) {
   return m.x * lane<0>(a) + m.y * lane<1>(a) + m.z * lane<2>(a);
@@ -83,10 +79,7 @@ TIEFMU_INLINE Pack operator*(const Columns& m, Pack a) {
 
 // The same number of four neighbours, side by side.
 using Lanes = double __attribute__((vector_size(32)));
-template <class Number>
-struct Three {
-  Number x, y, z;
-};
+template <class Number> struct Three { Number x, y, z; };
 using Lanes3 = Three<Lanes>;
 #ifdef __AVX2__
 TIEFMU_INLINE Lanes root(Lanes a) { return _mm256_sqrt_pd(a); }
@@ -122,18 +115,21 @@ TIEFMU_INLINE void storeFour(double* p, std::ptrdiff_t stride, int count, Lanes 
   }
 }
 #endif
-template <class N>
-TIEFMU_INLINE Three<N> operator+(const Three<N>& a, const Three<N>& b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
-template <class N>
-TIEFMU_INLINE Three<N> operator-(const Three<N>& a, const Three<N>& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
-template <class S, class N>
-TIEFMU_INLINE Three<N> operator*(const S& s, const Three<N>& a) { return {s * a.x, s * a.y, s * a.z}; }
-template <class N>
-TIEFMU_INLINE Three<N> cross(const Three<N>& a, const Three<N>& b) {
+template <class N> TIEFMU_INLINE Three<N> operator+(const Three<N>& a, const Three<N>& b) {
+  return {a.x + b.x, a.y + b.y, a.z + b.z};
+}
+template <class N> TIEFMU_INLINE Three<N> operator-(const Three<N>& a, const Three<N>& b) {
+  return {a.x - b.x, a.y - b.y, a.z - b.z};
+}
+template <class S, class N> TIEFMU_INLINE Three<N> operator*(const S& s, const Three<N>& a) {
+  return {s * a.x, s * a.y, s * a.z};
+}
+template <class N> TIEFMU_INLINE Three<N> cross(const Three<N>& a, const Three<N>& b) {
   return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
-template <class N>
-TIEFMU_INLINE N dot(const Three<N>& a, const Three<N>& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+template <class N> TIEFMU_INLINE N dot(const Three<N>& a, const Three<N>& b) {
+  return a.x * b.x + a.y * b.y + a.z * b.z;
+}
 
 }  // namespace
 }  // namespace tiefmu

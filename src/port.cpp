@@ -46,8 +46,8 @@ Ports::Ports(const Model& model, const Layout& layout, double* data)
     s.arm = port.arm;
     s.lever = port.lever;
     if (port.turnWeight > 0)
-      s.turning = static_cast<int>(std::count_if(port.member.begin(), port.member.end(),
-                                                 [&](int slave) { return slave < model.turning(); }));
+      s.turning = static_cast<int>(
+          std::count_if(port.member.begin(), port.member.end(), [&](int slave) { return slave < model.turning(); }));
     shapes_.push_back(std::move(s));
     setShape(shapes_.size() - 1, nullptr);
   }
@@ -60,8 +60,7 @@ void Ports::setShape(std::size_t k, const Mat3* turned) {
   s.inverse = inverseSymmetric(armInertia(s.arm) + s.turning * port.turnWeight * Mat3::Identity());
   if (!turned || port.lever.isZero(0)) return;
   Mat3 h = *turned;
-  for (std::size_t i = 0; i < port.member.size(); ++i)
-    h += at(s.arm.data(), i) * at(port.arm.data(), i).transpose();
+  for (std::size_t i = 0; i < port.member.size(); ++i) h += at(s.arm.data(), i) * at(port.arm.data(), i).transpose();
   s.lever = closestRotation(h) * port.lever;
 }
 

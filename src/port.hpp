@@ -35,11 +35,11 @@ class Ports {
   void setStart();
 
   // --- driven nodes
-  void move();                              // velocities and accelerations of the nodes, from the ports' inputs
+  void move();  // velocities and accelerations of the nodes, from the ports' inputs
   // Before a drift over [tau, tau + h] of the inputs' curve: the velocities and spins that carry the nodes to its end.
   void carry(const InputCurve& inputs, double tau, double h);
   void advance(const InputCurve& inputs, double tau, double h);  // after it: pose, positions and velocities at the end
-  void moveChange(double* dot) const;       // changes of the nodes' motion with the inputs', laid out like `data`
+  void moveChange(double* dot) const;  // changes of the nodes' motion with the inputs', laid out like `data`
   // Resultants of the nodes' loads (f 3 per node, t 3 per rotating node), added to force, moment (3 per port).
   void gather(const double* f, const double* t, double* force, double* moment) const;
 
@@ -47,7 +47,7 @@ class Ports {
   // Arms and J at slave positions `xs` (small displacements: as they were at the start). `quaternion(k)`: the rotation
   // number k as SpringEnd::orientation counts.
   template <class Quaternion> void shape(const double* xs, Quaternion quaternion);
-  std::string collapsed() const;            // name of a port whose slaves have come to lie on a line; empty: none
+  std::string collapsed() const;  // name of a port whose slaves have come to lie on a line; empty: none
   void spread(const double* force, const double* moment, double* fs, double* ms) const;  // added to the slaves' loads
   void mean(const double* vs, const double* ws, double* velocity, double* spin) const;
   double power(const double* vs, const double* ws) const;  // of the loads that are inputs, W
@@ -79,8 +79,7 @@ class Ports {
   std::vector<Shape> shapes_;        // per port of slaves
 };
 
-template <class Quaternion>
-void Ports::shape(const double* xs, Quaternion quaternion) {
+template <class Quaternion> void Ports::shape(const double* xs, Quaternion quaternion) {
   if (!model_.finite()) return;
   for (std::size_t k = 0; k < shapes_.size(); ++k) {
     const Port& port = slavePort(k);

@@ -24,15 +24,15 @@ enum class Method : std::uint8_t { centralDifference, symplecticEuler, nohBathe,
 
 struct SceneNodes {
   std::vector<std::int64_t> id;
-  std::vector<Vec3> position;           // m
-  std::vector<Motion> motion;           // ignored for slaves
-  std::vector<std::uint8_t> rotations;  // 1: the node has rotational freedom
-  std::vector<double> mass;             // kg
-  std::vector<double> inertia;          // kg m2, spherical
-  std::vector<double> stiffness;        // N/m, declared nodal stiffness of what the scene does not hold
+  std::vector<Vec3> position;               // m
+  std::vector<Motion> motion;               // ignored for slaves
+  std::vector<std::uint8_t> rotations;      // 1: the node has rotational freedom
+  std::vector<double> mass;                 // kg
+  std::vector<double> inertia;              // kg m2, spherical
+  std::vector<double> stiffness;            // N/m, declared nodal stiffness of what the scene does not hold
   std::vector<double> rotationalStiffness;  // N m/rad
-  std::vector<Vec3> velocity;           // m/s at the start
-  std::vector<Vec3> spin;               // rad/s at the start
+  std::vector<Vec3> velocity;               // m/s at the start
+  std::vector<Vec3> spin;                   // rad/s at the start
 };
 
 struct SceneSegments {
@@ -66,9 +66,9 @@ constexpr int mostThreads = 256;
 struct ScenePort {
   std::string name;
   std::vector<int> nodes;
-  bool listed = false;      // by ids: each must be part of the model; of a set those that are not are passed over
-  bool atMean = true;       // reference point: the mean of its nodes' positions, or `at`
-  Vec3 at = Vec3::Zero();   // m
+  bool listed = false;     // by ids: each must be part of the model; of a set those that are not are passed over
+  bool atMean = true;      // reference point: the mean of its nodes' positions, or `at`
+  Vec3 at = Vec3::Zero();  // m
 };
 
 struct Settings {
@@ -78,9 +78,9 @@ struct Settings {
   Position position = Position::integrated;
   Vec3 gravity = Vec3::Zero();  // m/s2
   Method method = Method::centralDifference;
-  double timeStep = 0;          // s; 0: safety * limit
+  double timeStep = 0;  // s; 0: safety * limit
   double safety = 0.9;
-  int threads = 0;              // from 1 to mostThreads; 0: one, and no parameter of the FMU
+  int threads = 0;                        // from 1 to mostThreads; 0: one, and no parameter of the FMU
   std::vector<std::string> expose, hide;  // names of INTERFACE's last two tables
 };
 
@@ -95,8 +95,6 @@ struct Scene {
 
 // A scene that cannot be modelled. `what()` is one line that starts with the table it speaks of,
 // e.g. "tie 'weld': slave 101: ...".
-struct SceneError : std::runtime_error {
-  using std::runtime_error::runtime_error;
-};
+struct SceneError : std::runtime_error { using std::runtime_error::runtime_error; };
 
 }  // namespace tiefmu

@@ -53,8 +53,7 @@ void SegmentSearch::Tree::split(int node, int first, int last) {
   split(child + 1, middle, last);
 }
 
-template <class Limit, class Visit>
-void SegmentSearch::Tree::visit(const Vec3& s, Limit limit, Visit visit) const {
+template <class Limit, class Visit> void SegmentSearch::Tree::visit(const Vec3& s, Limit limit, Visit visit) const {
   if (nodes_.empty()) return;
   std::pair<int, double> stack[128];  // median splits: depth below 64
   int depth = 0;
@@ -190,8 +189,10 @@ Match SegmentSearch::nearestNode(const Vec3& slave, double side) const {
     for (int k = holdersBegin_[i]; k < holdersBegin_[i + 1]; ++k) {
       const int e = holders_[k];
       Match match{e, project(corners(e, x), x, slave), distance, -1};
-      if (!match.projection.converged) unconverged = e;
-      else if (match.projection.outside <= maxOutside) candidates.push_back(match);
+      if (!match.projection.converged)
+        unconverged = e;
+      else if (match.projection.outside <= maxOutside)
+        candidates.push_back(match);
     }
   }
   Match match = best(candidates, std::numeric_limits<double>::infinity());

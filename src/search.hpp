@@ -10,10 +10,10 @@
 namespace tiefmu {
 
 struct Match {
-  int segment = -1;        // index into the list the search was made of; -1: not found
+  int segment = -1;  // index into the list the search was made of; -1: not found
   Projection projection;
-  double distance = 0;     // what it competed with: orthogonal if interior, to its nearest node if exterior, m
-  int unconverged = -1;    // a candidate on which the projection did not converge
+  double distance = 0;   // what it competed with: orthogonal if interior, to its nearest node if exterior, m
+  int unconverged = -1;  // a candidate on which the projection did not converge
 };
 
 // Exact: every answer is that of trying all segments. A tree of boxes only leaves out what cannot win.
@@ -41,8 +41,12 @@ class SegmentSearch {
     void build(std::vector<Box> boxes);
     // Visits items in boxes nearer than `limit()`, which may shrink meanwhile.
     template <class Limit, class Visit> void visit(const Vec3& s, Limit limit, Visit visit) const;
+
    private:
-    struct Node { Box box; int first, count; };  // count > 0: leaf; else children at first and first + 1
+    struct Node {
+      Box box;
+      int first, count;
+    };  // count > 0: leaf; else children at first and first + 1
     std::vector<Node> nodes_;
     std::vector<int> items_;
     std::vector<Box> boxes_;
@@ -54,8 +58,8 @@ class SegmentSearch {
   std::vector<Vec3> position_;
   std::vector<std::array<int, 4>> segments_;
   std::vector<std::int64_t> ids_;
-  std::vector<int> zeroArea_, nodes_;           // nodes_: those of usable segments
-  std::vector<int> holdersBegin_, holders_;     // per entry of nodes_: the segments that hold it
+  std::vector<int> zeroArea_, nodes_;        // nodes_: those of usable segments
+  std::vector<int> holdersBegin_, holders_;  // per entry of nodes_: the segments that hold it
   Tree segmentTree_, nodeTree_;
   double edge_ = 0;
 };

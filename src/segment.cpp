@@ -89,8 +89,7 @@ Projection project(int n, const Vec3* corner, const Vec3& slave) {
   p.phi = shape(n, p.xi, p.eta);
   for (int i = 0; i < n; ++i) p.point += p.phi[i] * corner[i];
   p.distance = (slave - p.point).norm();
-  p.outside = n == 4 ? std::max(std::abs(p.xi), std::abs(p.eta))
-                     : 1 - 2 * std::min({p.phi[0], p.phi[1], p.phi[2]});
+  p.outside = n == 4 ? std::max(std::abs(p.xi), std::abs(p.eta)) : 1 - 2 * std::min({p.phi[0], p.phi[1], p.phi[2]});
   return p;
 }
 

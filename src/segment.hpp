@@ -36,9 +36,9 @@ Phi clamped(int n, const double* phi);
 bool zeroArea(int n, const Vec3* corner);
 
 struct NodeInertia {
-  Vec3 centre;         // C, m
-  Mat3 ibar;           // sum (r.r) 1 - r r^T, m2
-  double lambda = 0;   // 1 / smallest eigenvalue, 1/m2 (infinite for collinear nodes)
+  Vec3 centre;        // C, m
+  Mat3 ibar;          // sum (r.r) 1 - r r^T, m2
+  double lambda = 0;  // 1 / smallest eigenvalue, 1/m2 (infinite for collinear nodes)
   double condition = 0;
 };
 NodeInertia nodeInertia(int n, const Vec3* corner);

@@ -12,12 +12,12 @@
 namespace tiefmu {
 namespace {
 
-constexpr double runaway = 3e8;         // m/s, rad/s: no explicit solution that is still one gets there
-constexpr double farAway = 1e30;        // m: beyond it squares of lengths overflow before long
-constexpr int refreshEvery = 100;       // substeps between two looks at the highest frequency, at most
-constexpr double refreshTurn = 0.1;     // rad that the geometry turns between them, at most
-constexpr double largestTurn = 0.25;    // rad a substep, where the bias of consistent inertia is explicit
-constexpr int checkEvery = 16;          // substeps between two looks for divergence
+constexpr double runaway = 3e8;       // m/s, rad/s: no explicit solution that is still one gets there
+constexpr double farAway = 1e30;      // m: beyond it squares of lengths overflow before long
+constexpr int refreshEvery = 100;     // substeps between two looks at the highest frequency, at most
+constexpr double refreshTurn = 0.1;   // rad that the geometry turns between them, at most
+constexpr double largestTurn = 0.25;  // rad a substep, where the bias of consistent inertia is explicit
+constexpr int checkEvery = 16;        // substeps between two looks for divergence
 constexpr double maxSubsteps = 1e9;
 constexpr double none = 1e30;
 
@@ -46,8 +46,12 @@ struct Simulation::Impl {
   bool prepared = false;
 
   explicit Impl(std::shared_ptr<const Model> m)
-      : model(std::move(m)), layout(*model), data(layout.size), dynamics(*model, layout, data.data()),
-        integrator(dynamics), spectrum(dynamics) {
+      : model(std::move(m)),
+        layout(*model),
+        data(layout.size),
+        dynamics(*model, layout, data.data()),
+        integrator(dynamics),
+        spectrum(dynamics) {
     dampers = layout[Field::lagged].count > 0;
     energy = layout[Field::energy].count > 0;
     for (Field f : {Field::position, Field::segmentRotation, Field::orientation, Field::angle})
@@ -68,7 +72,8 @@ struct Simulation::Impl {
       const bool own = std::any_of(model->groups.begin(), model->groups.end(),
                                    [](const TieGroup& g) { return g.coupling == Coupling::rotation; });
       const Slice last = layout[Field::work], rotation = layout[Field::segmentRotation];
-      kept[0] = {layout[Field::position].offset, layout[Field::position].count + (own ? layout[Field::offset].count : 0)};
+      kept[0] = {layout[Field::position].offset,
+                 layout[Field::position].count + (own ? layout[Field::offset].count : 0)};
       kept[1] = {rotation.offset, last.offset + last.count - rotation.offset};
       backup.resize(kept[0].count + kept[1].count);
     }
@@ -173,10 +178,10 @@ struct Simulation::Impl {
         for (int k = 0; k < 3; ++k) {
           if (std::abs(v[3 * i + k]) < runaway) continue;  // false for NaN
           char text[200];
-          std::snprintf(text, sizeof text, "diverged at t = %.9g s: %s of node %lld is %.3g %s; limit of the time step %.3g s",
-                        time, f == Field::velocity ? "velocity" : "angular velocity",
-                        static_cast<long long>(model->nodeId[i]), v[3 * i + k],
-                        f == Field::velocity ? "m/s" : "rad/s", methodLimit());
+          std::snprintf(
+              text, sizeof text, "diverged at t = %.9g s: %s of node %lld is %.3g %s; limit of the time step %.3g s",
+              time, f == Field::velocity ? "velocity" : "angular velocity", static_cast<long long>(model->nodeId[i]),
+              v[3 * i + k], f == Field::velocity ? "m/s" : "rad/s", methodLimit());
           throw Diverged(text, layout[f].offset + static_cast<std::size_t>(3 * i + k));
         }
     }
@@ -201,8 +206,8 @@ struct Simulation::Impl {
     if (model->ports.empty()) return;
     char text[80];
     std::snprintf(text, sizeof text, "diverged at t = %.9g s: ", time);
-    for (const auto& [place, rate] : {std::pair{Field::portPlace, Field::portVelocity},
-                                      std::pair{Field::portRotation, Field::portSpin}})
+    for (const auto& [place, rate] :
+         {std::pair{Field::portPlace, Field::portVelocity}, std::pair{Field::portRotation, Field::portSpin}})
       for (std::size_t k = 0; k < layout[rate].count; ++k) {
         const double from = place == Field::portPlace ? field(place)[k] : 0;
         if (std::abs(from + h * field(rate)[k]) < farAway) continue;  // false for NaN
@@ -276,7 +281,8 @@ struct Simulation::Impl {
       const double count = std::max(1.0, std::ceil(left / limit * (1 - 1e-12)));
       if (!(count <= maxSubsteps)) {
         char text[160];
-        std::snprintf(text, sizeof text, "a step of %.6g s would take %.3g substeps of at most %.3g s", duration, count, limit);
+        std::snprintf(text, sizeof text, "a step of %.6g s would take %.3g substeps of at most %.3g s", duration, count,
+                      limit);
         throw StepTooLong(text);
       }
       const std::int64_t n = static_cast<std::int64_t>(count);
@@ -316,7 +322,9 @@ struct Simulation::Impl {
   }
 };
 
-Simulation::Simulation(std::shared_ptr<const Model> model) : impl_(std::make_unique<Impl>(std::move(model))) { reset(); }
+Simulation::Simulation(std::shared_ptr<const Model> model) : impl_(std::make_unique<Impl>(std::move(model))) {
+  reset();
+}
 Simulation::~Simulation() = default;
 
 const Model& Simulation::model() const { return *impl_->model; }
@@ -357,8 +365,8 @@ void Simulation::outputRates(double* rates) {
   const double h = 1e-5 * std::min(limit, 1.0);
   try {
     if (s.model->accelerationInputs())
-      for (const auto& [motion, rate] : {std::pair{Field::velocity, Field::acceleration},
-                                         std::pair{Field::spin, Field::angularAcceleration}})
+      for (const auto& [motion, rate] :
+           {std::pair{Field::velocity, Field::acceleration}, std::pair{Field::spin, Field::angularAcceleration}})
         for (std::size_t k = 0; k < s.layout[motion].count; ++k) {
           const int node = static_cast<int>(k / 3);
           const std::size_t place = s.layout[motion].offset + k;
@@ -429,8 +437,10 @@ void Simulation::step(double duration) {
   s.save();
   try {
     s.checkPorts(duration);
-    if (s.model->anyFree()) s.integrate(duration);
-    else s.carry(duration);
+    if (s.model->anyFree())
+      s.integrate(duration);
+    else
+      s.carry(duration);
     s.dynamics.inputs.clear();
     s.outputsOld = true;
     if (!s.model->anyFree()) s.loadsOld = true;

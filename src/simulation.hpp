@@ -22,9 +22,7 @@ struct Diverged : std::runtime_error {
 };
 
 // A step that would take more than a thousand million substeps; the state before it has been put back.
-struct StepTooLong : std::runtime_error {
-  using std::runtime_error::runtime_error;
-};
+struct StepTooLong : std::runtime_error { using std::runtime_error::runtime_error; };
 
 class Simulation {
  public:
@@ -47,7 +45,8 @@ class Simulation {
 
   // Back to the start values, as constructed.
   void reset();
-  // Start time, s. Then inertia, limits and the first outputs are there. Throws SceneError (e.g. free node without mass).
+  // Start time, s. Then inertia, limits and the first outputs are there. Throws SceneError (e.g. free node without
+  // mass).
   void initialise(double time);
   // How an input at `place` of the array moves inside the next step: order 1 (its rate) or 2. Afterwards the input
   // stands at the step's end.

@@ -25,8 +25,8 @@ SpringLoad springLoad(const Spring& spring, const EndMotion& a, const EndMotion&
   load.fa = -load.fb;
   load.ta = spring.rotationalStiffness.cwiseProduct(turn) + spring.rotationalDamping.cwiseProduct(spin);
   load.tb = line.cross(load.fb) - load.ta;
-  load.energy = 0.5 * (shift.dot(spring.stiffness.cwiseProduct(shift)) +
-                       turn.dot(spring.rotationalStiffness.cwiseProduct(turn)));
+  load.energy =
+      0.5 * (shift.dot(spring.stiffness.cwiseProduct(shift)) + turn.dot(spring.rotationalStiffness.cwiseProduct(turn)));
   load.dissipation =
       rate.dot(spring.damping.cwiseProduct(rate)) + spin.dot(spring.rotationalDamping.cwiseProduct(spin));
   return load;

@@ -81,8 +81,7 @@ double nodalStep(const Model& model, const double* addedMass, const double* adde
       if (stiffness[i] > 0)
         smallest = std::min(smallest, std::sqrt(2 * (model.nodeMass[i] + addedMass[i]) / stiffness[i]));
       if (i < model.rotating() && rotationalStiffness[i] > 0)
-        smallest =
-            std::min(smallest, std::sqrt(2 * (model.nodeInertia[i] + addedInertia[i]) / rotationalStiffness[i]));
+        smallest = std::min(smallest, std::sqrt(2 * (model.nodeInertia[i] + addedInertia[i]) / rotationalStiffness[i]));
     }
   return smallest;
 }

@@ -15,7 +15,8 @@ const TieKernels* fastest() {
 const TieKernels* kernels = fastest();
 
 TieView view(const TieGroup& group, SegmentRange range) {
-  return {group.coupling, group.corners, range, group.firstSlave, group.node.data(), group.begin.data(), group.weight.data()};
+  return {group.coupling,     group.corners,      range, group.firstSlave, group.node.data(),
+          group.begin.data(), group.weight.data()};
 }
 
 }  // namespace

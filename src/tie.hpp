@@ -11,8 +11,9 @@
 
 namespace tiefmu {
 
-// The kernels are built for the baseline of the machine and for AVX2, and the best that it has is used. This chooses the
-// baseline instead, for the whole process (tests; results do not depend on it). Returns whether it is the baseline now.
+// The kernels are built for the baseline of the machine and for AVX2, and the best that it has is used. This chooses
+// the baseline instead, for the whole process (tests; results do not depend on it). Returns whether it is the baseline
+// now.
 bool useBaselineKernels(bool baseline);
 
 // u_s = T u. `u`, `turn`: 3 per node / rotating node (velocity and spin, or acceleration, or displacement and small
@@ -32,7 +33,8 @@ void addBias(const TieGroup& group, SegmentRange range, TieGeometry geometry, co
 // x_s: 3 per slave, from node positions and offsets (m).
 void place(const TieGroup& group, SegmentRange range, TieGeometry geometry, const double* position, double* xs);
 
-// Arms, centres and Ibar^-1 of meanMotion segments at these node positions. False: one has collapsed to a line or a point.
+// Arms, centres and Ibar^-1 of meanMotion segments at these node positions. False: one has collapsed to a line or a
+// point.
 bool updateFrames(const TieGroup& group, SegmentRange range, const double* position, SegmentFrame* frame);
 
 // Offsets of a rotation group turned by exp(h w_P), their length held at 1/sqrt(inverseLength2) to rounding.

@@ -45,8 +45,7 @@ struct Changing {
   }
 };
 
-template <class Body>
-void eachChanging(const TieGroup& group, TieGeometry geometry, const double* dx, Body body) {
+template <class Body> void eachChanging(const TieGroup& group, TieGeometry geometry, const double* dx, Body body) {
   if (group.coupling != Coupling::meanMotion) return;
   for (int e = 0; e < group.segments(); ++e) body(Changing(group, geometry, e, dx));
 }
@@ -86,9 +85,9 @@ void biasChange(const TieGroup& group, TieGeometry geometry, const double* dx, c
     for (int i = 0; i < segment.corners; ++i) rate[i] = at(velocity, segment.node[i]) - centre;
     // Ibar z = -Ibar' w, both sides changed
     const Vec3 z = -segment.inverse * segment.inertiaChange(segment.arm, rate, w);
-    const Vec3 dz = -segment.inverse * (segment.inertiaChange(segment.dArm, rate, w) +
-                                        segment.inertiaChange(segment.arm, rate, dw) +
-                                        segment.inertiaChange(segment.arm, segment.dArm, z));
+    const Vec3 dz = -segment.inverse *
+                    (segment.inertiaChange(segment.dArm, rate, w) + segment.inertiaChange(segment.arm, rate, dw) +
+                     segment.inertiaChange(segment.arm, segment.dArm, z));
     for (int s = segment.first; s < segment.last; ++s) {
       const Vec3 d = at(geometry.offset, s);
       at(as, s) += dz.cross(d) + dw.cross(w.cross(d)) + w.cross(dw.cross(d));

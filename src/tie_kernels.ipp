@@ -1,5 +1,5 @@
-// The kernels of tie.hpp, compiled in each build under its own flags. Nothing here may use a function that another build
-// shares, or the linker could keep the one that this machine cannot run.
+// The kernels of tie.hpp, compiled in each build under its own flags. Nothing here may use a function that another
+// build shares, or the linker could keep the one that this machine cannot run.
 #include <cmath>
 #include <cstddef>
 #include <type_traits>
@@ -21,8 +21,7 @@ TIEFMU_INLINE void frameAhead(const SegmentFrame* frame) {
   __builtin_prefetch(p + 16);
 }
 
-template <int N>
-struct Corners {
+template <int N> struct Corners {
   const int* node;
   TIEFMU_INLINE void gather(const double* field, Pack* to) const {
     for (int i = 0; i < N; ++i) to[i] = load(field + 3 * static_cast<std::ptrdiff_t>(node[i]));
@@ -35,28 +34,24 @@ struct Corners {
   }
 };
 
-template <int N>
-TIEFMU_INLINE Pack weighted(const double* phi, const Pack* u) {
+template <int N> TIEFMU_INLINE Pack weighted(const double* phi, const Pack* u) {
   Pack sum = phi[0] * u[0];
   for (int i = 1; i < N; ++i) sum += phi[i] * u[i];
   return sum;
 }
 
-template <int N>
-TIEFMU_INLINE Pack mean(const Pack* u) {
+template <int N> TIEFMU_INLINE Pack mean(const Pack* u) {
   Pack sum = u[0];
   for (int i = 1; i < N; ++i) sum += u[i];
   return (1.0 / N) * sum;
 }
 
-template <int N>
-TIEFMU_INLINE void arms(const SegmentFrame& frame, Pack* r) {
+template <int N> TIEFMU_INLINE void arms(const SegmentFrame& frame, Pack* r) {
   for (int i = 0; i < N; ++i) r[i] = load(frame.arm + 3 * i);
 }
 
 // sum r x v, of unit masses at the corners: Ibar w
-template <int N>
-TIEFMU_INLINE Pack angularMomentum(const Pack* r, const Pack* v) {
+template <int N> TIEFMU_INLINE Pack angularMomentum(const Pack* r, const Pack* v) {
   Pack sum = crossZxy(r[0], v[0]);
   for (int i = 1; i < N; ++i) sum += crossZxy(r[i], v[i]);
   return yzx(sum);
@@ -71,8 +66,7 @@ struct Four {
 };
 
 // Arms from the centre of the nodes, and Ibar^-1.
-template <int N>
-TIEFMU_INLINE Four frameOf(Lanes3* x, Lanes3& centre) {
+template <int N> TIEFMU_INLINE Four frameOf(Lanes3* x, Lanes3& centre) {
   centre = x[0];
   for (int i = 1; i < N; ++i) centre = centre + x[i];
   centre = (1.0 / N) * centre;
@@ -114,15 +108,13 @@ TIEFMU_INLINE bool sound(const Lanes& sum) { return sum[0] + sum[1] + sum[2] + s
 constexpr int together = 32;
 
 // Calls body(first, last) over the range.
-template <class Body>
-TIEFMU_INLINE void eachRun(const TieView& tie, Body body) {
+template <class Body> TIEFMU_INLINE void eachRun(const TieView& tie, Body body) {
   for (int first = tie.range.first; first < tie.range.last; first += together)
     body(first, tie.range.last - first < together ? tie.range.last : first + together);
 }
 
 // Calls body(first segment, how many of the four count, gather); past the end the last segment stands in.
-template <int N, class Body>
-TIEFMU_INLINE void eachFourSegments(const TieView& tie, int first, int end, Body body) {
+template <int N, class Body> TIEFMU_INLINE void eachFourSegments(const TieView& tie, int first, int end, Body body) {
   for (int e = first; e < end; e += 4) {
     const int last = end - 1, count = last - e < 3 ? last - e + 1 : 4;
     const int* node[4];
@@ -131,39 +123,35 @@ TIEFMU_INLINE void eachFourSegments(const TieView& tie, int first, int end, Body
       const auto at = [&](int k, int i) TIEFMU_INLINED { return field + 3 * static_cast<std::ptrdiff_t>(node[k][i]); };
       for (int i = 0; i < N; ++i) to[i] = loadFour(at(0, i), at(1, i), at(2, i), at(3, i));
     };
-    if (count == 4) body(e, 4, gather);
-    else body(e, count, gather);
+    if (count == 4)
+      body(e, 4, gather);
+    else
+      body(e, count, gather);
   }
 }
 
-template <int N>
-TIEFMU_INLINE Corners<N> corners(const TieView& tie, int e) {
+template <int N> TIEFMU_INLINE Corners<N> corners(const TieView& tie, int e) {
   return {tie.node + N * static_cast<std::ptrdiff_t>(e)};
 }
 
 // Calls body(segment, corners, first slave, last slave); slaves as indices of the slave arrays.
-template <int N, class Body>
-TIEFMU_INLINE void eachSegment(const TieView& tie, Body body) {
+template <int N, class Body> TIEFMU_INLINE void eachSegment(const TieView& tie, Body body) {
   for (int e = tie.range.first; e < tie.range.last; ++e)
-    body(e, corners<N>(tie, e), tie.firstSlave + tie.begin[e],
-         tie.firstSlave + tie.begin[e + 1]);
+    body(e, corners<N>(tie, e), tie.firstSlave + tie.begin[e], tie.firstSlave + tie.begin[e + 1]);
 }
 
 // Phi, to be indexed by N times a slave's place in the slave arrays.
-template <int N>
-TIEFMU_INLINE const double* weights(const TieView& tie) {
-  return tie.weight - N * tie.firstSlave;
-}
+template <int N> TIEFMU_INLINE const double* weights(const TieView& tie) { return tie.weight - N * tie.firstSlave; }
 
 // Calls body(number of corners as a type).
-template <class Body>
-TIEFMU_INLINE void byCorners(const TieView& tie, Body body) {
-  if (tie.corners == 4) body(std::integral_constant<int, 4>{});
-  else body(std::integral_constant<int, 3>{});
+template <class Body> TIEFMU_INLINE void byCorners(const TieView& tie, Body body) {
+  if (tie.corners == 4)
+    body(std::integral_constant<int, 4>{});
+  else
+    body(std::integral_constant<int, 3>{});
 }
 
-template <int N>
-TIEFMU_INLINE void followTranslation(const TieView& tie, const double* u, double* us) {
+template <int N> TIEFMU_INLINE void followTranslation(const TieView& tie, const double* u, double* us) {
   const double* weight = weights<N>(tie);
   eachSegment<N>(tie, [&](int, Corners<N> nodes, std::ptrdiff_t s, std::ptrdiff_t last) TIEFMU_INLINED {
     Pack ui[N];
@@ -226,14 +214,16 @@ TIEFMU_INLINE void followMeanMotion(const TieView& tie, TieGeometry geometry, co
 void follow(const TieView& tie, TieGeometry geometry, const double* u, const double* turn, double* us, double* turns) {
   byCorners(tie, [&](auto n) TIEFMU_INLINED {
     constexpr int N = decltype(n)::value;
-    if (tie.coupling == Coupling::translation) followTranslation<N>(tie, u, us);
-    else if (tie.coupling == Coupling::rotation) followRotation<N>(tie, geometry.offset, u, turn, us, turns);
-    else followMeanMotion<N>(tie, geometry, u, us, turns);
+    if (tie.coupling == Coupling::translation)
+      followTranslation<N>(tie, u, us);
+    else if (tie.coupling == Coupling::rotation)
+      followRotation<N>(tie, geometry.offset, u, turn, us, turns);
+    else
+      followMeanMotion<N>(tie, geometry, u, us, turns);
   });
 }
 
-template <int N>
-TIEFMU_INLINE void distributeTranslation(const TieView& tie, const double* force, double* f) {
+template <int N> TIEFMU_INLINE void distributeTranslation(const TieView& tie, const double* force, double* f) {
   const double* weight = weights<N>(tie);
   eachSegment<N>(tie, [&](int, Corners<N> nodes, std::ptrdiff_t s, std::ptrdiff_t last) TIEFMU_INLINED {
     Pack fi[N] = {};
@@ -312,9 +302,12 @@ void distribute(const TieView& tie, TieGeometry geometry, const double* force, c
                 double* t) {
   byCorners(tie, [&](auto n) TIEFMU_INLINED {
     constexpr int N = decltype(n)::value;
-    if (tie.coupling == Coupling::translation) distributeTranslation<N>(tie, force, f);
-    else if (tie.coupling == Coupling::rotation) distributeRotation<N>(tie, geometry.offset, force, moment, f, t);
-    else distributeMeanMotion<N>(tie, geometry, force, moment, f);
+    if (tie.coupling == Coupling::translation)
+      distributeTranslation<N>(tie, force, f);
+    else if (tie.coupling == Coupling::rotation)
+      distributeRotation<N>(tie, geometry.offset, force, moment, f, t);
+    else
+      distributeMeanMotion<N>(tie, geometry, force, moment, f);
   });
 }
 
@@ -413,8 +406,7 @@ TIEFMU_INLINE void large(const Lanes& a2, Lanes& s, Lanes& c) {
 
 // d + sin(a)/a (angle x d) + (1 - cos a)/a^2 angle x (angle x d), a = |angle| [Rodrigues], at its length, of which
 // `inverse` is 1/square.
-template <class N>
-TIEFMU_INLINE Three<N> turned(const Three<N>& angle, const Three<N>& d, const N& inverse) {
+template <class N> TIEFMU_INLINE Three<N> turned(const Three<N>& angle, const Three<N>& d, const N& inverse) {
   const N a2 = dot(angle, angle);
   // The terms left out are below 1e-17.
   N s = 1 + a2 * (-1.0 / 6 + a2 * (1.0 / 120 - a2 * (1.0 / 5040)));
@@ -468,8 +460,8 @@ void turnOffsets(const TieView& tie, double h, const double* spin, const double*
   for (int k = fours; k < count; ++k) {
     const double* u = angle + 3 * k;
     double* d = offset + 3 * (first + k - fours);
-    const Three<double> next = turned(Three<double>{u[0], u[1], u[2]}, Three<double>{d[0], d[1], d[2]},
-                                      inverseLength2[first + k - fours]);
+    const Three<double> next =
+        turned(Three<double>{u[0], u[1], u[2]}, Three<double>{d[0], d[1], d[2]}, inverseLength2[first + k - fours]);
     d[0] = next.x;
     d[1] = next.y;
     d[2] = next.z;
@@ -574,8 +566,7 @@ bool within(std::size_t count, const double* value, double limit) {
 
 }  // namespace
 
-const TieKernels TIEFMU_KERNELS = {follow,      distribute,   addBias,       place,   updateFrames,
-                                   turnOffsets, moveSegments, rotateOffsets, meanSpin, addScaled,
-                                   accelerate,  within};
+const TieKernels TIEFMU_KERNELS = {follow,       distribute,    addBias,  place,     updateFrames, turnOffsets,
+                                   moveSegments, rotateOffsets, meanSpin, addScaled, accelerate,   within};
 
 }  // namespace tiefmu

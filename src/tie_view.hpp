@@ -1,4 +1,5 @@
-// What the kernels of the tie read and write, as plain data: their builds for other instruction sets share no other type.
+// What the kernels of the tie read and write, as plain data: their builds for other instruction sets share no other
+// type.
 #pragma once
 
 #include <cstddef>
@@ -22,13 +23,11 @@ struct SegmentFrame {
 
 // Present geometry, as the kernels read it.
 struct TieGeometry {
-  const double* offset;         // 3 per slave: d
-  const SegmentFrame* frame;    // of the group's first segment; meanMotion only
+  const double* offset;       // 3 per slave: d
+  const SegmentFrame* frame;  // of the group's first segment; meanMotion only
 };
 
-struct SegmentRange {
-  int first, last;
-};
+struct SegmentRange { int first, last; };
 
 // Some segments of a TieGroup (model.hpp).
 struct TieView {

@@ -71,8 +71,10 @@ void Workers::run(int count, Call call, const void* body) {
   while (takeOne()) {
   }
   for (int idle = 0; done_.load(std::memory_order_acquire) < count; ++idle) {
-    if (idle < spins) pause();
-    else std::this_thread::yield();
+    if (idle < spins)
+      pause();
+    else
+      std::this_thread::yield();
   }
 }
 

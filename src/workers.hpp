@@ -18,10 +18,9 @@ class Workers {
   Workers(const Workers&) = delete;
   Workers& operator=(const Workers&) = delete;
 
-  // body(k) once for each k in [0, count), count < 65536, on whichever thread comes first; returns when all have returned. `body` must
-  // not throw.
-  template <class Body>
-  void each(int count, const Body& body) {
+  // body(k) once for each k in [0, count), count < 65536, on whichever thread comes first; returns when all have
+  // returned. `body` must not throw.
+  template <class Body> void each(int count, const Body& body) {
     if (count < 2 || threads_.empty()) {
       for (int k = 0; k < count; ++k) body(k);
       return;

@@ -11,11 +11,22 @@ def weld() -> dict:
     """The scene of the interface page: one quad, one slave off its plane, driven masters."""
     return {
         "title": "Spot weld on a quarter panel",
-        "mesh": {"nodes": [[1, 0, 0, 0], [2, 0.1, 0, 0], [3, 0.1, 0.1, 0], [4, 0, 0.1, 0], [101, 0.03, 0.06, 0.04]],
-                 "segments": [[1, 1, 2, 3, 4]]},
+        "mesh": {
+            "nodes": [[1, 0, 0, 0], [2, 0.1, 0, 0], [3, 0.1, 0.1, 0], [4, 0, 0.1, 0], [101, 0.03, 0.06, 0.04]],
+            "segments": [[1, 1, 2, 3, 4]],
+        },
         "node": [{"nodes": "all", "motion": "driven", "rotations": False, "mass": 1.0}, {"nodes": [101], "mass": 0.7}],
-        "tie": [{"name": "weld", "segments": "all", "slaves": [101], "formulation": "default", "search": "box",
-                 "search_distance": 0.0, "unresolved": "error"}],
+        "tie": [
+            {
+                "name": "weld",
+                "segments": "all",
+                "slaves": [101],
+                "formulation": "default",
+                "search": "box",
+                "search_distance": 0.0,
+                "unresolved": "error",
+            }
+        ],
     }
 
 
@@ -40,15 +51,19 @@ def scene_file(tmp_path, monkeypatch):
     def write(scene, name="weld.toml") -> str:
         (tmp_path / name).write_text(scene if isinstance(scene, str) else toml(scene))
         return name
+
     return write
 
 
 @pytest.fixture
 def command(tmp_path):
     """Runs the command line in a process of its own, in the test's folder."""
+
     def run(*arguments) -> subprocess.CompletedProcess:
-        return subprocess.run([sys.executable, "-m", "tiefmu.cli", *map(str, arguments)], cwd=tmp_path,
-                              capture_output=True, text=True)
+        return subprocess.run(
+            [sys.executable, "-m", "tiefmu.cli", *map(str, arguments)], cwd=tmp_path, capture_output=True, text=True
+        )
+
     return run
 
 

@@ -4,12 +4,11 @@ import ctypes
 import sys
 import tempfile
 import zipfile
-from ctypes import POINTER, byref, c_char_p, c_double, c_int, c_size_t, c_uint, c_void_p
+from ctypes import byref, c_char_p, c_double, c_int, c_size_t, c_uint, c_void_p
 from pathlib import Path
 
 import fmpy
 import numpy as np
-
 import tiefmu
 
 OK, WARNING, DISCARD, ERROR, FATAL, PENDING = range(6)
@@ -18,8 +17,13 @@ Logger = ctypes.CFUNCTYPE(None, c_void_p, c_char_p, c_int, c_char_p, c_char_p, c
 
 
 class Callbacks(ctypes.Structure):
-    _fields_ = [("logger", Logger), ("allocate", c_void_p), ("free", c_void_p), ("step_finished", c_void_p),
-                ("environment", c_void_p)]
+    _fields_ = [
+        ("logger", Logger),
+        ("allocate", c_void_p),
+        ("free", c_void_p),
+        ("step_finished", c_void_p),
+        ("environment", c_void_p),
+    ]
 
 
 class Fmu:
@@ -32,12 +36,14 @@ class Fmu:
         self.path = scene if made else tiefmu.build(tiefmu.load(scene), self.folder / "scene.fmu")
         with zipfile.ZipFile(self.path) as archive:
             archive.extractall(self.folder)
-        self.description = fmpy.read_model_description(str(self.path), validate=True, validate_variable_names=False,
-                                                       validate_model_structure=True)
+        self.description = fmpy.read_model_description(
+            str(self.path), validate=True, validate_variable_names=False, validate_model_structure=True
+        )
         self.variables = {v.name: v for v in self.description.modelVariables}
         self.reference = {v.name: v.valueReference for v in self.description.modelVariables}
-        platform, suffix = {"win32": ("win64", ".dll"), "darwin": ("darwin64", ".dylib")}.get(sys.platform,
-                                                                                                ("linux64", ".so"))
+        platform, suffix = {"win32": ("win64", ".dll"), "darwin": ("darwin64", ".dylib")}.get(
+            sys.platform, ("linux64", ".so")
+        )
         identifier = self.description.coSimulation.modelIdentifier
         self.binary = self.folder / "binaries" / platform / (identifier + suffix)
         self.library = ctypes.CDLL(str(self.binary))
@@ -58,19 +64,28 @@ class Instance:
 
         def keep(*message):
             self.log.append(tuple(m.decode() if isinstance(m, bytes) else m for m in message))
+
         self.callbacks = Callbacks(Logger(keep), None, None, None, environment)
         location = (fmu.folder / "resources").as_uri() if location is None else location
         self.component = fmu.library.fmi2Instantiate(
-            name.encode(), kind, (fmu.description.guid if guid is None else guid).encode(), location.encode(),
-            byref(self.callbacks), 0, int(logging))
+            name.encode(),
+            kind,
+            (fmu.description.guid if guid is None else guid).encode(),
+            location.encode(),
+            byref(self.callbacks),
+            0,
+            int(logging),
+        )
 
     def call(self, function: str, *arguments) -> int:
         return getattr(self.fmu.library, "fmi2" + function)(c_void_p(self.component), *arguments)
 
     def start(self, time=0.0, values=None, stop=None) -> "Instance":
         """Up to the first communication point."""
-        assert self.call("SetupExperiment", 0, c_double(0), c_double(time), int(stop is not None),
-                         c_double(stop or 0)) == OK
+        assert (
+            self.call("SetupExperiment", 0, c_double(0), c_double(time), int(stop is not None), c_double(stop or 0))
+            == OK
+        )
         if values:
             assert self.set(values) == OK
         assert self.call("EnterInitializationMode") == OK
@@ -117,5 +132,10 @@ class Instance:
 
 def set_derivatives(instance, names, orders, values) -> int:
     n = len(names)
-    return instance.call("SetRealInputDerivatives", (c_uint * n)(*[instance.fmu.reference[name] for name in names]),
-                         c_size_t(n), (c_int * n)(*orders), (c_double * n)(*values))
+    return instance.call(
+        "SetRealInputDerivatives",
+        (c_uint * n)(*[instance.fmu.reference[name] for name in names]),
+        c_size_t(n),
+        (c_int * n)(*orders),
+        (c_double * n)(*values),
+    )

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-
 from fmu_calls import Fmu
 
 SETTINGS = [
@@ -35,14 +34,25 @@ def scene(rng, formulation, rotations, motion, inertia, reaction, geometry, posi
     corners = np.vstack([sheet, sheet + [0, 0, 3]]) + 0.05 * rng.normal(size=(10, 3))
     slaves = np.array([[0.3, 0.4, 0.3], [0.7, 0.6, -0.2], [1.4, 0.5, 0.25], [0.4, 0.7, 3.4], [1.5, 0.45, 2.7]])
     points = np.array([[0.5, 0.5, 1.2], [0.6, 0.4, 2.2]])
-    nodes = [[first + k, *(turn @ x)] for first, group in ((1, corners), (101, slaves), (201, points))
-             for k, x in enumerate(group)]
+    nodes = [
+        [first + k, *(turn @ x)]
+        for first, group in ((1, corners), (101, slaves), (201, points))
+        for k, x in enumerate(group)
+    ]
     turns = rotations or formulation == "optimized"
     masters = list(range(1, 11))
     chosen = {"mixed": ["driven", "driven", "free", "fixed", "free", "driven", "free", "driven", "driven", "free"]}
     motions = chosen.get(motion, [motion] * 10)
-    table = [{"nodes": [i], "motion": m, "rotations": rotations, "mass": rng.uniform(1, 2),
-              "inertia": rng.uniform(0.2, 0.4) if rotations else 0.0} for i, m in zip(masters, motions)]
+    table = [
+        {
+            "nodes": [i],
+            "motion": m,
+            "rotations": rotations,
+            "mass": rng.uniform(1, 2),
+            "inertia": rng.uniform(0.2, 0.4) if rotations else 0.0,
+        }
+        for i, m in zip(masters, motions)
+    ]
     table.append({"nodes": [201], "motion": "driven", "rotations": turns})
     table.append({"nodes": [202], "motion": "free", "rotations": turns, "mass": 1.5, "inertia": 0.3 if turns else 0.0})
     table += [{"nodes": [101 + j], "mass": rng.uniform(1, 2), "inertia": 0.3 if turns else 0.0} for j in range(5)]
@@ -50,18 +60,50 @@ def scene(rng, formulation, rotations, motion, inertia, reaction, geometry, posi
     return {
         "mesh": {"nodes": nodes, "segments": [[1, 1, 2, 3, 4], [2, 2, 5, 3], [3, 6, 7, 8, 9], [4, 7, 10, 8]]},
         "node": table,
-        "tie": [{"name": "tie", "segments": "all", "slaves": [101, 102, 103, 104, 105], "formulation": formulation,
-                 "search_distance": 2.0}],
-        "spring": [{"nodes": [101, 201], "kind": "bushing", "stiffness": [3.0, 4.0, 5.0], "damping": [0.5, 0.7, 0.9],
-                    **turning},
-                   {"nodes": [104, 202], "kind": "axial", "stiffness": 2.0, "damping": 0.3},
-                   {"nodes": [201, 5], "kind": "axial", "stiffness": 2.0, "damping": 0.3}],
-        "initial": [{"nodes": [i for i, m in zip(masters, motions) if m == "free"] + [202],
-                     "v": rng.normal(size=3).tolist()}],
-        "model": {"inertia": inertia, "reaction": reaction, "geometry": geometry, "position": position,
-                  "gravity": [0.3, 0.0, -9.81]},
-        "interface": {"expose": ["slave.r", "slave.a", "master.r", "point.r", "energy", "drift", "power_residual",
-                                 "slave.mass", "slave.inertia", "master.stiffness"]},
+        "tie": [
+            {
+                "name": "tie",
+                "segments": "all",
+                "slaves": [101, 102, 103, 104, 105],
+                "formulation": formulation,
+                "search_distance": 2.0,
+            }
+        ],
+        "spring": [
+            {
+                "nodes": [101, 201],
+                "kind": "bushing",
+                "stiffness": [3.0, 4.0, 5.0],
+                "damping": [0.5, 0.7, 0.9],
+                **turning,
+            },
+            {"nodes": [104, 202], "kind": "axial", "stiffness": 2.0, "damping": 0.3},
+            {"nodes": [201, 5], "kind": "axial", "stiffness": 2.0, "damping": 0.3},
+        ],
+        "initial": [
+            {"nodes": [i for i, m in zip(masters, motions) if m == "free"] + [202], "v": rng.normal(size=3).tolist()}
+        ],
+        "model": {
+            "inertia": inertia,
+            "reaction": reaction,
+            "geometry": geometry,
+            "position": position,
+            "gravity": [0.3, 0.0, -9.81],
+        },
+        "interface": {
+            "expose": [
+                "slave.r",
+                "slave.a",
+                "master.r",
+                "point.r",
+                "energy",
+                "drift",
+                "power_residual",
+                "slave.mass",
+                "slave.inertia",
+                "master.stiffness",
+            ]
+        },
     }
 
 
@@ -98,8 +140,13 @@ def any_fmu(request, tmp_path_factory):
 @pytest.fixture
 def loose(tmp_path):
     """One free quad without springs: nothing limits the step, and a large force runs away."""
-    scene = {"mesh": {"nodes": [[1, 0, 0, 0], [2, 1, 0, 0], [3, 1, 1, 0], [4, 0, 1, 0], [101, 0.3, 0.6, 0.0]],
-                      "segments": [[1, 1, 2, 3, 4]]},
-             "node": [{"nodes": "all", "motion": "free", "mass": 1.0}],
-             "tie": [{"name": "tie", "slaves": [101]}], "interface": {"expose": ["slave.mass"]}}
+    scene = {
+        "mesh": {
+            "nodes": [[1, 0, 0, 0], [2, 1, 0, 0], [3, 1, 1, 0], [4, 0, 1, 0], [101, 0.3, 0.6, 0.0]],
+            "segments": [[1, 1, 2, 3, 4]],
+        },
+        "node": [{"nodes": "all", "motion": "free", "mass": 1.0}],
+        "tie": [{"name": "tie", "slaves": [101]}],
+        "interface": {"expose": ["slave.mass"]},
+    }
     return Fmu(scene, tmp_path)

@@ -1,7 +1,6 @@
 """A scene run by the solver in this process; variables by FMU names without the component: run["slave[1].v"]."""
 
 import numpy as np
-
 import tiefmu
 
 EXPOSED = ["slave.r", "slave.a", "master.r", "point.r", "energy", "power_residual", "drift", "master.stiffness"]

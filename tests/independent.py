@@ -260,15 +260,23 @@ class Spring:
             stretch, rate = length - np.linalg.norm(self.arm), u @ (v1 - v2)
             f = -(self.k[0] * stretch + self.c[0] * rate) * u
             zero = np.zeros(3)
-            return (np.concatenate([f, zero]), np.concatenate([-f, zero]), 0.5 * self.k[0] * stretch**2,
-                    self.c[0] * rate**2)
+            return (
+                np.concatenate([f, zero]),
+                np.concatenate([-f, zero]),
+                0.5 * self.k[0] * stretch**2,
+                self.c[0] * rate**2,
+            )
         stretch = gap - rotation_matrix(q2) @ self.arm
         rate = v1 - v2 - np.cross(w2, gap)
         angle, spin = rotation_vector(relative(q1, q2)), w1 - w2
         f = -self.k * stretch - self.c * rate
         m = -self.kr * angle - self.cr * spin
-        return (np.concatenate([f, m]), np.concatenate([-f, -m - np.cross(gap, f)]),
-                0.5 * (self.k @ stretch**2 + self.kr @ angle**2), self.c @ rate**2 + self.cr @ spin**2)
+        return (
+            np.concatenate([f, m]),
+            np.concatenate([-f, -m - np.cross(gap, f)]),
+            0.5 * (self.k @ stretch**2 + self.kr @ angle**2),
+            self.c @ rate**2 + self.cr @ spin**2,
+        )
 
     def strain_map(self):
         """(6, 12): small motions (u, theta) of a and b to strains, and their stiffnesses (6,)."""
@@ -419,8 +427,14 @@ class Problem:
         n, s = len(self.ids), len(self.slaves)
         cuts = np.cumsum([3 * n, 3 * n, 3 * n, 4 * n, 4 * s])
         x, v, w, qn, qs, xs = np.split(y, cuts)
-        return (x.reshape(-1, 3), v.reshape(-1, 3), w.reshape(-1, 3), qn.reshape(-1, 4), qs.reshape(-1, 4),
-                xs.reshape(-1, 3))
+        return (
+            x.reshape(-1, 3),
+            v.reshape(-1, 3),
+            w.reshape(-1, 3),
+            qn.reshape(-1, 4),
+            qs.reshape(-1, 4),
+            xs.reshape(-1, 3),
+        )
 
     def start(self):
         one = np.array([1.0, 0, 0, 0])
@@ -495,10 +509,24 @@ class Problem:
         moving = self.node_masses() * np.repeat(self.motion == "free", 6)
         kinetic = 0.5 * (moving @ np.hstack([v, w]).ravel() ** 2 + ms @ twist.ravel() ** 2)
         reaction = {"loads": loads, "full": full, "split": full + self.added_masses() * a}
-        return {"x": x, "v": v, "w": w, "a": a.reshape(-1, 6), "slave_x": place, "slave_v": twist[:, :3],
-                "slave_w": twist[:, 3:], "slave_a": (tmap @ a + bias).reshape(-1, 6), "d": d, "T": tmap, "b": bias,
-                "reaction": {k: r.reshape(-1, 6) for k, r in reaction.items()}, "kinetic": kinetic, "strain": strain,
-                "dissipation": dissipation, "external": outside}
+        return {
+            "x": x,
+            "v": v,
+            "w": w,
+            "a": a.reshape(-1, 6),
+            "slave_x": place,
+            "slave_v": twist[:, :3],
+            "slave_w": twist[:, 3:],
+            "slave_a": (tmap @ a + bias).reshape(-1, 6),
+            "d": d,
+            "T": tmap,
+            "b": bias,
+            "reaction": {k: r.reshape(-1, 6) for k, r in reaction.items()},
+            "kinetic": kinetic,
+            "strain": strain,
+            "dissipation": dissipation,
+            "external": outside,
+        }
 
     def rate(self, t, y, inputs):
         now = self.evaluate(t, y, inputs)
@@ -513,8 +541,16 @@ class Problem:
 
     def solve(self, times, inputs=None, rtol=1e-12, atol=1e-15):
         """List of `evaluate` dicts at the times, integrated from times[0] by DOP853."""
-        answer = solve_ivp(self.rate, (times[0], times[-1]), self.start(), method="DOP853", t_eval=times, rtol=rtol,
-                           atol=atol, args=(inputs,))
+        answer = solve_ivp(
+            self.rate,
+            (times[0], times[-1]),
+            self.start(),
+            method="DOP853",
+            t_eval=times,
+            rtol=rtol,
+            atol=atol,
+            args=(inputs,),
+        )
         assert answer.success, answer.message
         return [self.evaluate(t, y, inputs) for t, y in zip(times, answer.y.T)]
 

@@ -3,17 +3,20 @@
 import copy
 
 import numpy as np
-from scipy.spatial.transform import Rotation
-
 import tiefmu
 from fmu_scenes import scene as many_sided
+from scipy.spatial.transform import Rotation
 from tiefmu.scene import plain
 
 XYZ = (1, 2, 3)
 # Driven masters of three of the four segments of fmu_scenes in one port and a driven point in another; slaves in a
 # third, and one slave alone in a fourth.
-PORTS = [{"name": "base", "nodes": [1, 2, 3, 4, 5, 6], "at": [0.3, -0.2, 0.4]}, {"name": "arm", "nodes": [201]},
-         {"name": "load", "nodes": [101, 102, 104], "at": [0.1, 0.7, 0.2]}, {"name": "tip", "nodes": [105]}]
+PORTS = [
+    {"name": "base", "nodes": [1, 2, 3, 4, 5, 6], "at": [0.3, -0.2, 0.4]},
+    {"name": "arm", "nodes": [201]},
+    {"name": "load", "nodes": [101, 102, 104], "at": [0.1, 0.7, 0.2]},
+    {"name": "tip", "nodes": [105]},
+]
 
 
 def ported(rng, settings, ports=None, motions="driven") -> dict:
@@ -47,8 +50,9 @@ class Pair:
         self.made = made
         self.ports, self.nodes = (tiefmu.load(scene).simulation() for scene in (made, single(made)))
         report = tiefmu.report(tiefmu.load(single(made)))
-        self.name = {row["id"]: f"{what}[{row['number']}]" for what in ("master", "slave", "point")
-                     for row in report[f"{what}s"]}
+        self.name = {
+            row["id"]: f"{what}[{row['number']}]" for what in ("master", "slave", "point") for row in report[f"{what}s"]
+        }
         self.start = {row[0]: np.array(row[1:]) for row in made["mesh"]["nodes"]}
         self.port = {row["name"]: row for row in tiefmu.report(tiefmu.load(made))["ports"]}
         self.known = {name for block in self.nodes.variables for name in names(block)}
@@ -89,8 +93,11 @@ def names(block: dict) -> list[str]:
     if not block["prefix"]:
         return [block["name"]]
     short = block["name"].removeprefix(block["prefix"] + ".")
-    return [f"{block['prefix']}[{place}].{short}{end}" for place in block["labels"] or block["numbers"].tolist()
-            for end in ends]
+    return [
+        f"{block['prefix']}[{place}].{short}{end}"
+        for place in block["labels"] or block["numbers"].tolist()
+        for end in ends
+    ]
 
 
 def vector(simulation, name: str, value=None):

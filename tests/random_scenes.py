@@ -1,7 +1,6 @@
 """Random segments, scenes and motions for the tests. Every scene is the dict of a TOML file, in SI."""
 
 import numpy as np
-
 from independent import local_coordinates, shape, shape_gradient
 
 
@@ -36,7 +35,9 @@ def slave_over(rng, corners, outside=1.4, offset=5.0):
         first = np.array([a, b]) @ np.array([a, b]).T
         cross = (shape(n, xi, eta) @ corners - point) @ (0.25 * np.array([1, -1, 1, -1]) @ corners) if n == 4 else 0
         well_defined = abs(cross) < 0.8 * np.sqrt(np.linalg.det(first)) * np.linalg.det(first) / np.prod(np.diag(first))
-        if n == 3 or well_defined and np.abs(local_coordinates(corners[None], point[None])[0] - (xi, eta)).max() < 1e-9:
+        if n == 3 or (
+            well_defined and np.abs(local_coordinates(corners[None], point[None])[0] - (xi, eta)).max() < 1e-9
+        ):
             return point
 
 
@@ -53,14 +54,27 @@ def one_segment(rng, n=4, formulation="default", rotations=True, slaves=3, motio
     for i in range(1, n + 1):
         node.append({"nodes": [i], "mass": rng.uniform(0.5, 2), "inertia": rng.uniform(0.1, 0.4) if rotations else 0.0})
     for j in range(slaves):
-        node.append({"nodes": [101 + j], "mass": rng.uniform(0.1, 2), "stiffness": rng.uniform(1, 5),
-                     "inertia": rng.uniform(0.01, 0.2) if turns else 0.0,
-                     "rotational_stiffness": rng.uniform(1, 5) if turns else 0.0})
+        node.append(
+            {
+                "nodes": [101 + j],
+                "mass": rng.uniform(0.1, 2),
+                "stiffness": rng.uniform(1, 5),
+                "inertia": rng.uniform(0.01, 0.2) if turns else 0.0,
+                "rotational_stiffness": rng.uniform(1, 5) if turns else 0.0,
+            }
+        )
     return {
         "mesh": {"nodes": rows(1, corners) + rows(101, points), "segments": [[1, *range(1, n + 1)]]},
         "node": node,
-        "tie": [{"name": "tie", "segments": [1], "slaves": [101 + j for j in range(slaves)], "search_distance": 100.0,
-                 "formulation": formulation}],
+        "tie": [
+            {
+                "name": "tie",
+                "segments": [1],
+                "slaves": [101 + j for j in range(slaves)],
+                "search_distance": 100.0,
+                "formulation": formulation,
+            }
+        ],
         "model": {},
     }
 
@@ -93,22 +107,27 @@ def structure(rng, formulation="default", rotations=True, inertia="consistent", 
         points.append(phi @ corners + gap * np.array([0, 0, 1.0]) * rng.uniform(0.5, 1))
     turns = formulation == "optimized" or rotations
     slave_ids = [101 + k for k in range(slaves)]
-    node = [{"nodes": "all", "motion": "free", "rotations": rotations, "mass": 1.0,
-             "inertia": 0.2 if rotations else 0.0},
-            {"nodes": slave_ids, "mass": 0.5, "inertia": 0.05 if turns else 0.0},
-            {"nodes": [301], "rotations": turns, "mass": 0.7, "inertia": 0.1 if turns else 0.0}]
+    node = [
+        {"nodes": "all", "motion": "free", "rotations": rotations, "mass": 1.0, "inertia": 0.2 if rotations else 0.0},
+        {"nodes": slave_ids, "mass": 0.5, "inertia": 0.05 if turns else 0.0},
+        {"nodes": [301], "rotations": turns, "mass": 0.7, "inertia": 0.1 if turns else 0.0},
+    ]
     turning = {"rotational_stiffness": 30.0} if turns else {}
     held = {"rotational_stiffness": 40.0} if rotations else {}
-    spring = [{"ground": list(range(1, count + 1)), "kind": "bushing", "stiffness": 200.0, **held},
-              {"nodes": [slave_ids[0], 301], "kind": "bushing", "stiffness": 150.0, **turning},
-              {"nodes": [slave_ids[-1], 301], "kind": "axial", "stiffness": 100.0}]
+    spring = [
+        {"ground": list(range(1, count + 1)), "kind": "bushing", "stiffness": 200.0, **held},
+        {"nodes": [slave_ids[0], 301], "kind": "bushing", "stiffness": 150.0, **turning},
+        {"nodes": [slave_ids[-1], 301], "kind": "axial", "stiffness": 100.0},
+    ]
     initial = []
     for i in range(1, count + 1):
         v, w = rng.uniform(-speed, speed, (2, 3)).tolist()
         initial.append({"nodes": [i], "v": v} | ({"w": w} if rotations else {}))
     return {
-        "mesh": {"nodes": rows(1, position) + rows(101, points) + rows(301, [points[0] + [0.1, 0.2, 0.5]]),
-                 "segments": segments},
+        "mesh": {
+            "nodes": rows(1, position) + rows(101, points) + rows(301, [points[0] + [0.1, 0.2, 0.5]]),
+            "segments": segments,
+        },
         "node": node,
         "tie": [{"name": "tie", "segments": "all", "slaves": slave_ids, "formulation": formulation}],
         "spring": spring,
@@ -132,11 +151,15 @@ def moved(scene, turn, shift):
 def renumbered(scene, new):
     """The same scene with node ids i -> new[i], tables in another order."""
     ids = lambda which: which if which == "all" else [new[i] for i in which]
-    mesh = {"nodes": [[new[row[0]], *row[1:]] for row in scene["mesh"]["nodes"]][::-1],
-            "segments": [[row[0], *(new[i] for i in row[1:])] for row in scene["mesh"]["segments"]][::-1]}
+    mesh = {
+        "nodes": [[new[row[0]], *row[1:]] for row in scene["mesh"]["nodes"]][::-1],
+        "segments": [[row[0], *(new[i] for i in row[1:])] for row in scene["mesh"]["segments"]][::-1],
+    }
     tables = {}
     for name in ("node", "tie", "spring", "initial"):
         if name in scene:
-            tables[name] = [{k: ids(v) if k in ("nodes", "slaves", "ground") else v for k, v in table.items()}
-                            for table in scene[name]]
+            tables[name] = [
+                {k: ids(v) if k in ("nodes", "slaves", "ground") else v for k, v in table.items()}
+                for table in scene[name]
+            ]
     return scene | {"mesh": mesh} | tables

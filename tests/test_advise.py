@@ -1,12 +1,11 @@
 """`tiefmu advise` on every example scene: what it says is run from the scene it wrote, and its error found anew."""
 
-import tomllib
 from pathlib import Path
 
 import numpy as np
 import pytest
-
 import tiefmu
+import tomllib
 from conftest import toml
 from tiefmu import advise as advising
 from tiefmu.cli import main
@@ -45,8 +44,11 @@ class Given:
     def mean(self, a, b):
         knots = np.concatenate([[a], self.time[(self.time > a) & (self.time < b)], [b]])
         values = np.array([self.at(t) for t in knots])
-        return np.trapezoid(values, knots, axis=0) / (b - a) if hasattr(np, "trapezoid") else \
-            np.trapz(values, knots, axis=0) / (b - a)
+        return (
+            np.trapezoid(values, knots, axis=0) / (b - a)
+            if hasattr(np, "trapezoid")
+            else np.trapz(values, knots, axis=0) / (b - a)
+        )
 
 
 def written(path, new, **changes):
@@ -79,9 +81,18 @@ def check_free(path, new, advice):
     given, scene = Given(path.with_suffix(".csv")), written(path, new)
     assert advice.choice.step <= advising.SAFETY * scene.start.integrator_limit * (1 + 1e-9)
     limit = scene.start.get("stable_time_step")[0]
-    exact = slave_velocities(written(path, new, model__inertia="consistent", model__geometry="finite",
-                                     integrator__method="rk4", integrator__time_step=limit / FINER / scene_time(new)),
-                             given, edges)
+    exact = slave_velocities(
+        written(
+            path,
+            new,
+            model__inertia="consistent",
+            model__geometry="finite",
+            integrator__method="rk4",
+            integrator__time_step=limit / FINER / scene_time(new),
+        ),
+        given,
+        edges,
+    )
     error = relative(slave_velocities(scene, given, edges), exact)
     assert error <= 1.02 * TOLERANCE
     assert error == pytest.approx(advice.choice.error_v, rel=0.05)
@@ -102,8 +113,12 @@ def play_host(scene, given, end, steps, middle, reaction):
     other, h = [given.names[k] for k in loads], end / steps
     added = scene.start.get("added_mass")[:, None]
     nodes = {int(i): k for k, i in enumerate(scene.model.report()["nodes"]["id"])}
-    ids = {f"master[{n}]": int(i) for block in simulation.variables if block["name"] == "master.f"
-           for n, i in zip(block["numbers"], block["ids"])}
+    ids = {
+        f"master[{n}]": int(i)
+        for block in simulation.variables
+        if block["name"] == "master.f"
+        for n, i in zip(block["numbers"], block["ids"])
+    }
     v, f = [], []
     for k in range(steps):
         simulation.set_values(names, given.at((k + (0.5 if middle else 0)) * h)[speeds])
@@ -128,14 +143,21 @@ def play_host(scene, given, end, steps, middle, reaction):
 
 def check_driven(path, new, advice):
     given, scene = Given(path.with_suffix(".csv")), written(path, new)
-    given.columns = given.columns[:, keep := [k for k, name in enumerate(given.names)
-                                              if name.split(".")[1][0] not in "az"]]
+    given.columns = given.columns[
+        :, keep := [k for k, name in enumerate(given.names) if name.split(".")[1][0] not in "az"]
+    ]
     given.names = [given.names[k] for k in keep]
     end, steps = given.time[-1], round(given.time[-1] / advice.choice.step)
     reaction = tomllib.loads(new.read_text())["model"]["reaction"]
     assert reaction == advice.choice.reaction and reaction != "full"
-    exact = play_host(written(path, new, model__inertia="consistent", model__geometry="finite",
-                              model__reaction="full"), given, end, 8 * len(given.time) // 40 * 40, True, "full")
+    exact = play_host(
+        written(path, new, model__inertia="consistent", model__geometry="finite", model__reaction="full"),
+        given,
+        end,
+        8 * len(given.time) // 40 * 40,
+        True,
+        "full",
+    )
     now = play_host(scene, given, end, steps, advice.choice.method == "midpoint input", reaction)
     errors = [relative(x, y) for x, y in zip(now, exact)]
     assert max(errors) <= 1.02 * TOLERANCE
@@ -165,10 +187,14 @@ def test_full_is_refused_for_the_heavy_slave(capsys):
 
 def test_mass_ratio_is_that_of_theory(tmp_path):
     """One slave m at the centre of four masters M, no offset: T^T m T / M has the eigenvalue m/(4 M)."""
-    scene = {"mesh": {"nodes": [[1, 0, 0, 0], [2, 1, 0, 0], [3, 1, 1, 0], [4, 0, 1, 0], [101, 0.5, 0.5, 0]],
-                      "segments": [[1, 1, 2, 3, 4]]},
-             "node": [{"nodes": "all", "mass": 2.0}, {"nodes": [101], "mass": 6.0}],
-             "tie": [{"segments": "all", "slaves": [101]}]}
+    scene = {
+        "mesh": {
+            "nodes": [[1, 0, 0, 0], [2, 1, 0, 0], [3, 1, 1, 0], [4, 0, 1, 0], [101, 0.5, 0.5, 0]],
+            "segments": [[1, 1, 2, 3, 4]],
+        },
+        "node": [{"nodes": "all", "mass": 2.0}, {"nodes": [101], "mass": 6.0}],
+        "tie": [{"segments": "all", "slaves": [101]}],
+    }
     (tmp_path / "a.toml").write_text(toml(scene))
     assert advising.mass_ratio(Source(tmp_path / "a.toml")) == pytest.approx(6 / 8, rel=1e-12)
     scene["node"][0]["mass"] = 0.0
@@ -188,10 +214,12 @@ def test_bad_input_is_one_line(tmp_path, capsys):
     spinning = next(path for path in SCENES if path.stem == "spinning")
     undriven = tmp_path / "undriven.toml"
     undriven.write_text(next(path for path in SCENES if path.stem == "heavy_slave").read_text())
-    for arguments, said in [(["nosuch.toml"], "nosuch.toml: no such file"),
-                            ([spinning, "--tolerance", "1e-15"], "out of reach"),
-                            ([undriven], "every master is driven and there is no input"),
-                            ([spinning, "--write", tmp_path / "no" / "new.toml"], "does not exist")]:
+    for arguments, said in [
+        (["nosuch.toml"], "nosuch.toml: no such file"),
+        ([spinning, "--tolerance", "1e-15"], "out of reach"),
+        ([undriven], "every master is driven and there is no input"),
+        ([spinning, "--write", tmp_path / "no" / "new.toml"], "does not exist"),
+    ]:
         assert main(["advise", *map(str, arguments)]) == 2
         error = capsys.readouterr().err
         assert said in error and error.startswith("error: ") and error.count("\n") == 1

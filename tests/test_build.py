@@ -9,7 +9,6 @@ from pathlib import Path
 import meshio
 import numpy as np
 import pytest
-
 import tiefmu
 from conftest import toml
 from tiefmu import package
@@ -25,39 +24,59 @@ def model_bytes(scene: dict) -> bytes:
 
 # ------------------------------------------------------------------------------------------------------------- units
 
+
 def everything(length, mass, time) -> dict:
     """A scene that uses every quantity with a unit, written in units of `length` m, `mass` kg and `time` s. All are
     decimal powers of ten, so that the text of each number changes and nothing else."""
+
     def in_units(value, powers):
-        factor = length**powers[0] * mass**powers[1] * time**powers[2]
+        factor = length ** powers[0] * mass ** powers[1] * time ** powers[2]
         scaled = np.asarray(value, float) / factor if factor > 1 else np.asarray(value, float) * round(1 / factor)
         return np.vectorize(lambda x: float(f"{x:.12g}"))(scaled).tolist()
 
     L, M, T, stiffness, turning = (1, 0, 0), (0, 1, 0), (0, 0, 1), (0, 1, -2), (2, 1, -2)
-    nodes = [[1, 0, 0, 0], [2, .1, 0, 0], [3, .1, .1, 0], [4, 0, .1, 0], [5, .3, 0, 0], [101, .03, .06, .04]]
+    nodes = [[1, 0, 0, 0], [2, 0.1, 0, 0], [3, 0.1, 0.1, 0], [4, 0, 0.1, 0], [5, 0.3, 0, 0], [101, 0.03, 0.06, 0.04]]
     return {
         "mesh": {"nodes": [[row[0], *in_units(row[1:], L)] for row in nodes], "segments": [[1, 1, 2, 3, 4]]},
-        "node": [{"nodes": "all", "motion": "free", "rotations": True, "mass": in_units(1.5, M),
-                  "inertia": in_units(0.002, (2, 1, 0)), "stiffness": in_units(4000, stiffness),
-                  "rotational_stiffness": in_units(30, turning)}],
+        "node": [
+            {
+                "nodes": "all",
+                "motion": "free",
+                "rotations": True,
+                "mass": in_units(1.5, M),
+                "inertia": in_units(0.002, (2, 1, 0)),
+                "stiffness": in_units(4000, stiffness),
+                "rotational_stiffness": in_units(30, turning),
+            }
+        ],
         "tie": [{"name": "weld", "slaves": [101], "search_distance": in_units(0.25, L)}],
-        "spring": [{"ground": [1, 2, 3], "kind": "bushing", "stiffness": in_units([1000, 2000, 3000], stiffness),
-                    "damping": in_units(5, (0, 1, -1)), "rotational_stiffness": in_units(7, turning),
-                    "rotational_damping": in_units([0.1, 0.2, 0.3], (2, 1, -1))},
-                   {"nodes": [4, 5], "stiffness": in_units(6000, stiffness), "damping": in_units(8, (0, 1, -1))}],
+        "spring": [
+            {
+                "ground": [1, 2, 3],
+                "kind": "bushing",
+                "stiffness": in_units([1000, 2000, 3000], stiffness),
+                "damping": in_units(5, (0, 1, -1)),
+                "rotational_stiffness": in_units(7, turning),
+                "rotational_damping": in_units([0.1, 0.2, 0.3], (2, 1, -1)),
+            },
+            {"nodes": [4, 5], "stiffness": in_units(6000, stiffness), "damping": in_units(8, (0, 1, -1))},
+        ],
         "initial": [{"nodes": [1, 2], "v": in_units([1, 2, 3], (1, 0, -1)), "w": in_units([4, 5, 6], (0, 0, -1))}],
         "model": {"gravity": in_units([0, 0, -10], (1, 0, -2))},
         "integrator": {"time_step": in_units(0.0002, T)},
     }
 
 
-@pytest.mark.parametrize("units, factors", [
-    ({"length": "mm", "mass": "t", "time": "s"}, (1e-3, 1e3, 1)),
-    ({"length": "mm", "mass": "kg", "time": "ms"}, (1e-3, 1, 1e-3)),
-    ({"length": "cm", "mass": "g", "time": "us"}, (1e-2, 1e-3, 1e-6)),
-    ({"length": "km", "mass": "mg", "time": "s"}, (1e3, 1e-6, 1)),
-    ({"length": "um"}, (1e-6, 1, 1)),
-])
+@pytest.mark.parametrize(
+    "units, factors",
+    [
+        ({"length": "mm", "mass": "t", "time": "s"}, (1e-3, 1e3, 1)),
+        ({"length": "mm", "mass": "kg", "time": "ms"}, (1e-3, 1, 1e-3)),
+        ({"length": "cm", "mass": "g", "time": "us"}, (1e-2, 1e-3, 1e-6)),
+        ({"length": "km", "mass": "mg", "time": "s"}, (1e3, 1e-6, 1)),
+        ({"length": "um"}, (1e-6, 1, 1)),
+    ],
+)
 def test_units_give_the_same_model(units, factors):
     metric = found(everything(1, 1, 1))
     other = found(everything(*factors) | {"units": units})
@@ -76,8 +95,10 @@ def test_millimetres_and_tonnes_give_the_same_bits(weld):
     assert model_bytes(other) == model_bytes(weld)
 
 
-@pytest.mark.parametrize("units, metres, kilograms", [
-    ({"length": "in", "mass": "lb", "time": "min"}, 0.0254, 0.45359237), ({"length": "ft"}, 0.3048, 1.0)])
+@pytest.mark.parametrize(
+    "units, metres, kilograms",
+    [({"length": "in", "mass": "lb", "time": "min"}, 0.0254, 0.45359237), ({"length": "ft"}, 0.3048, 1.0)],
+)
 def test_other_units(weld, units, metres, kilograms):
     weld["units"] = units
     weld["node"][0]["rotations"] = True
@@ -103,11 +124,14 @@ def compare(one, other, path="report"):
 
 # ------------------------------------------------------------------------------------------------- node tables, initial
 
+
 def test_later_node_tables_override_node_by_node_and_key_by_key(weld):
-    weld["node"] = [{"nodes": "all", "mass": 1.0, "stiffness": 5.0},
-                    {"nodes": [1, 2], "mass": 2.0, "motion": "free"},
-                    {"nodes": [2, 3], "motion": "fixed", "rotations": True, "inertia": 0.5},
-                    {"nodes": [101], "mass": 0.7}]
+    weld["node"] = [
+        {"nodes": "all", "mass": 1.0, "stiffness": 5.0},
+        {"nodes": [1, 2], "mass": 2.0, "motion": "free"},
+        {"nodes": [2, 3], "motion": "fixed", "rotations": True, "inertia": 0.5},
+        {"nodes": [101], "mass": 0.7},
+    ]
     masters = {row["id"]: row for row in found(weld)["masters"]}
     assert [masters[i]["mass"] for i in (1, 2, 3, 4)] == [2.0, 2.0, 1.0, 1.0]
     assert [masters[i]["motion"] for i in (1, 2, 3, 4)] == ["free", "fixed", "fixed", "driven"]
@@ -180,14 +204,19 @@ ABAQUS = """*Heading
 @pytest.fixture
 def abaqus_scene(tmp_path) -> dict:
     (tmp_path / "panel.inp").write_text(ABAQUS)
-    return {"mesh": {"file": str(tmp_path / "panel.inp")}, "node": [{"nodes": "all", "mass": 1.0}],
-            "tie": [{"name": "weld", "segments": "whole", "slaves": "welds"}]}
+    return {
+        "mesh": {"file": str(tmp_path / "panel.inp")},
+        "node": [{"nodes": "all", "mass": 1.0}],
+        "tie": [{"name": "weld", "segments": "whole", "slaves": "welds"}],
+    }
 
 
 def test_abaqus_file_keeps_its_ids(abaqus_scene):
     report = found(abaqus_scene)
-    assert [(row["id"], row["segment"], row["nodes"]) for row in report["slaves"]] == \
-        [(901, 7, [10, 20, 30, 40]), (902, 9, [50, 60, 30])]
+    assert [(row["id"], row["segment"], row["nodes"]) for row in report["slaves"]] == [
+        (901, 7, [10, 20, 30, 40]),
+        (902, 9, [50, 60, 30]),
+    ]
     assert report["notes"] == []
 
 
@@ -197,13 +226,18 @@ def test_abaqus_sets_of_nodes_and_of_elements(abaqus_scene, name, moved):
     assert {row["id"] for row in found(abaqus_scene)["masters"] if row["mass"] == 3} == moved
 
 
-@pytest.mark.parametrize("tie, line", [
-    ({"segments": "edge"}, "tie 'weld': segments: the set 'edge' holds no segment"),
-    ({"segments": "rim"}, "tie 'weld': segments: 'rim' is a set of nodes, not of segments"),
-    ({"segments": "panels"}, "tie 'weld': segments: the mesh has no set 'panels'; did you mean 'panel'?"),
-    ({"slaves": "nuts"}, "tie 'weld': slaves: the mesh has no set 'nuts'; known: edge, panel, plate, right, rim, "
-     "welds, whole"),
-])
+@pytest.mark.parametrize(
+    "tie, line",
+    [
+        ({"segments": "edge"}, "tie 'weld': segments: the set 'edge' holds no segment"),
+        ({"segments": "rim"}, "tie 'weld': segments: 'rim' is a set of nodes, not of segments"),
+        ({"segments": "panels"}, "tie 'weld': segments: the mesh has no set 'panels'; did you mean 'panel'?"),
+        (
+            {"slaves": "nuts"},
+            "tie 'weld': slaves: the mesh has no set 'nuts'; known: edge, panel, plate, right, rim, welds, whole",
+        ),
+    ],
+)
 def test_wrong_sets(abaqus_scene, tie, line):
     abaqus_scene["tie"][0] |= tie
     with pytest.raises(tiefmu.SceneError) as error:
@@ -211,21 +245,30 @@ def test_wrong_sets(abaqus_scene, tie, line):
     assert str(error.value) == f"scene: {line}"
 
 
-@pytest.mark.parametrize("old, new, line", [
-    ("*ELEMENT, TYPE=S3, ELSET=right", "*ELEMENT, TYPE=S6, ELSET=right",
-     "element type S6 is quadratic; segments need three or four nodes"),
-    (" 901, 902, 1", " 901, 903, 1", "set 'welds': node 903 is not in the file"),
-    (" 901, 902, 1", " 901, 902, 1, 1", "set 'welds': GENERATE takes first, last and step, found '901, 902, 1, 1'"),
-    (" 7, 10, 20, 30, 40", " 7, 10, 20, 30", "element 7 has 3 nodes, its type has 4"),
-    (" 7, 10, 20, 30, 40", " 7, 10, 20, 30, 41", "segment 7: node 41 is not in the mesh (ids 10..902)"),
-    (" 60, 0.2, 0.1, 0.", " 60, 0.2, x, 0.", "*NODE: cannot be read (could not convert string to float: ' x')"),
-    (" 60, 0.2, 0.1, 0.", " 60, 0.2, nan, 0.", "node 60: a coordinate is not a finite number"),
-    (" 60, 0.2, 0.1, 0.", " 50, 0.2, 0.1, 0.", "node 50 is repeated"),
-    ("*NSET, NSET=rim", "*NGEN\n 1, 2, 3\n*NSET, NSET=rim",
-     "*NGEN makes or moves nodes without listing them; write the mesh out in full"),
-    (" panel, right", " panels", "set 'whole': 'panels' is neither an id nor a set defined before"),
-    ("** a quad", "*INCLUDE, INPUT=more.inp\n** a quad", "*INCLUDE: cannot be read ("),
-])
+@pytest.mark.parametrize(
+    "old, new, line",
+    [
+        (
+            "*ELEMENT, TYPE=S3, ELSET=right",
+            "*ELEMENT, TYPE=S6, ELSET=right",
+            "element type S6 is quadratic; segments need three or four nodes",
+        ),
+        (" 901, 902, 1", " 901, 903, 1", "set 'welds': node 903 is not in the file"),
+        (" 901, 902, 1", " 901, 902, 1, 1", "set 'welds': GENERATE takes first, last and step, found '901, 902, 1, 1'"),
+        (" 7, 10, 20, 30, 40", " 7, 10, 20, 30", "element 7 has 3 nodes, its type has 4"),
+        (" 7, 10, 20, 30, 40", " 7, 10, 20, 30, 41", "segment 7: node 41 is not in the mesh (ids 10..902)"),
+        (" 60, 0.2, 0.1, 0.", " 60, 0.2, x, 0.", "*NODE: cannot be read (could not convert string to float: ' x')"),
+        (" 60, 0.2, 0.1, 0.", " 60, 0.2, nan, 0.", "node 60: a coordinate is not a finite number"),
+        (" 60, 0.2, 0.1, 0.", " 50, 0.2, 0.1, 0.", "node 50 is repeated"),
+        (
+            "*NSET, NSET=rim",
+            "*NGEN\n 1, 2, 3\n*NSET, NSET=rim",
+            "*NGEN makes or moves nodes without listing them; write the mesh out in full",
+        ),
+        (" panel, right", " panels", "set 'whole': 'panels' is neither an id nor a set defined before"),
+        ("** a quad", "*INCLUDE, INPUT=more.inp\n** a quad", "*INCLUDE: cannot be read ("),
+    ],
+)
 def test_wrong_abaqus_files(abaqus_scene, old, new, line):
     path = Path(abaqus_scene["mesh"]["file"])
     path.write_text(ABAQUS.replace(old, new, 1))
@@ -237,8 +280,10 @@ def test_wrong_abaqus_files(abaqus_scene, old, new, line):
 def test_file_is_relative_to_the_scene_and_inline_adds(tmp_path):
     (tmp_path / "parts").mkdir()
     (tmp_path / "parts" / "panel.inp").write_text(ABAQUS)
-    scene = {"mesh": {"file": "parts/panel.inp", "nodes": [[1, 0.05, 0.05, 0.01]], "segments": [[1, 10, 20, 30, 40]]},
-             "tie": [{"name": "inline", "segments": [1], "slaves": [1]}]}
+    scene = {
+        "mesh": {"file": "parts/panel.inp", "nodes": [[1, 0.05, 0.05, 0.01]], "segments": [[1, 10, 20, 30, 40]]},
+        "tie": [{"name": "inline", "segments": [1], "slaves": [1]}],
+    }
     path = tmp_path / "weld.toml"
     path.write_text(toml(scene))
     assert tiefmu.report(tiefmu.load(path))["slaves"][0]["nodes"] == [10, 20, 30, 40]
@@ -321,16 +366,26 @@ $EndElements
 """
 
 
-@pytest.mark.parametrize("text, sets", [(GMSH2, {"corner": [10], "edge": [10, 20], "panel": [10, 20, 30, 40]}),
-                                        (GMSH4, {"edge": [10, 20], "panel": [10, 20, 30, 40]})])
+@pytest.mark.parametrize(
+    "text, sets",
+    [
+        (GMSH2, {"corner": [10], "edge": [10, 20], "panel": [10, 20, 30, 40]}),
+        (GMSH4, {"edge": [10, 20], "panel": [10, 20, 30, 40]}),
+    ],
+)
 def test_gmsh_files_keep_their_ids_and_physical_groups(tmp_path, text, sets):
     path = tmp_path / "panel.msh"
     path.write_text(text)
-    scene = {"mesh": {"file": str(path)}, "node": [{"nodes": "all", "mass": 1.0}],
-             "tie": [{"name": "weld", "segments": [71, 72], "slaves": [901, 902]}]}
+    scene = {
+        "mesh": {"file": str(path)},
+        "node": [{"nodes": "all", "mass": 1.0}],
+        "tie": [{"name": "weld", "segments": [71, 72], "slaves": [901, 902]}],
+    }
     report = found(scene)
-    assert [(row["id"], row["segment"], row["nodes"]) for row in report["slaves"]] == \
-        [(901, 72, [10, 20, 30, 40]), (902, 71, [20, 5, 30])]
+    assert [(row["id"], row["segment"], row["nodes"]) for row in report["slaves"]] == [
+        (901, 72, [10, 20, 30, 40]),
+        (902, 71, [20, 5, 30]),
+    ]
     assert report["notes"] == []
     for name, ids in sets.items():
         scene["node"] = [{"nodes": "all", "mass": 1.0}, {"nodes": name, "mass": 3.0}]
@@ -339,26 +394,44 @@ def test_gmsh_files_keep_their_ids_and_physical_groups(tmp_path, text, sets):
     assert found(scene)["slaves"][0]["segment"] == 72
 
 
-@pytest.mark.parametrize("name, options", [("panel.vtk", {}), ("panel.vtu", {}),
-                                           ("panel.msh", {"file_format": "gmsh22", "binary": True})])
+@pytest.mark.parametrize(
+    "name, options", [("panel.vtk", {}), ("panel.vtu", {}), ("panel.msh", {"file_format": "gmsh22", "binary": True})]
+)
 def test_other_files_are_numbered_in_file_order_and_say_so(tmp_path, name, options):
-    points = [[0, 0, 0], [.1, 0, 0], [.1, .1, 0], [0, .1, 0], [.2, .05, 0], [.03, .06, .004], [.13, .05, .004]]
+    points = [
+        [0, 0, 0],
+        [0.1, 0, 0],
+        [0.1, 0.1, 0],
+        [0, 0.1, 0],
+        [0.2, 0.05, 0],
+        [0.03, 0.06, 0.004],
+        [0.13, 0.05, 0.004],
+    ]
     mesh = meshio.Mesh(points, [("line", [[0, 1]]), ("triangle", [[1, 4, 2]]), ("quad", [[0, 1, 2, 3]])])
     meshio.write(tmp_path / name, mesh, **options)
-    report = found({"mesh": {"file": str(tmp_path / name)}, "node": [{"nodes": "all", "mass": 1.0}],
-                    "tie": [{"name": "weld", "slaves": [6, 7]}]})
-    assert [(row["id"], row["segment"], row["nodes"]) for row in report["slaves"]] == \
-        [(6, 2, [1, 2, 3, 4]), (7, 1, [2, 5, 3])]
+    report = found(
+        {
+            "mesh": {"file": str(tmp_path / name)},
+            "node": [{"nodes": "all", "mass": 1.0}],
+            "tie": [{"name": "weld", "slaves": [6, 7]}],
+        }
+    )
+    assert [(row["id"], row["segment"], row["nodes"]) for row in report["slaves"]] == [
+        (6, 2, [1, 2, 3, 4]),
+        (7, 1, [2, 5, 3]),
+    ]
     assert report["notes"][0] == f"mesh: {tmp_path / name}: nodes and segments are numbered from 1 in file order"
 
 
 def test_quadratic_elements_are_refused(tmp_path):
-    points = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [.5, 0, 0], [.5, .5, 0], [0, .5, 0]]
+    points = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0.5, 0, 0], [0.5, 0.5, 0], [0, 0.5, 0]]
     meshio.write(tmp_path / "six.vtk", meshio.Mesh(points, [("triangle6", [[0, 1, 2, 3, 4, 5]])]))
     with pytest.raises(tiefmu.SceneError) as error:
         tiefmu.load({"mesh": {"file": str(tmp_path / "six.vtk")}, "tie": [{"name": "a", "slaves": [1]}]})
-    assert str(error.value) == f"scene: mesh: file: {tmp_path / 'six.vtk'}: its 'triangle6' elements are quadratic; " \
-                               "segments need linear triangles and quads"
+    assert (
+        str(error.value) == f"scene: mesh: file: {tmp_path / 'six.vtk'}: its 'triangle6' elements are quadratic; "
+        "segments need linear triangles and quads"
+    )
 
 
 @pytest.mark.parametrize("name, text", [("panel.xyz", "1 2 3"), ("panel.vtk", "nonsense"), ("panel.msh", "$Nodes\n")])
@@ -373,15 +446,31 @@ def test_unreadable_mesh_files(tmp_path, name, text, capfd):
 
 # --------------------------------------------------------------------------------------------------------------- report
 
-REPORT_KEYS = {"title", "ties", "slaves", "masters", "points", "springs", "dropped", "left_out", "warnings", "notes",
-               "stable_time_step", "nodal_time_step", "integrator_limit", "freedoms", "variables"}
+REPORT_KEYS = {
+    "title",
+    "ties",
+    "slaves",
+    "masters",
+    "points",
+    "springs",
+    "dropped",
+    "left_out",
+    "warnings",
+    "notes",
+    "stable_time_step",
+    "nodal_time_step",
+    "integrator_limit",
+    "freedoms",
+    "variables",
+}
 
 
 def test_report_of_the_example(weld):
     report = found(weld)
     assert report.keys() == REPORT_KEYS
-    assert report["ties"] == [{"name": "weld", "formulation": "default", "search": "box", "search_distance": 0.1,
-                               "segments": 1, "slaves": 1}]
+    assert report["ties"] == [
+        {"name": "weld", "formulation": "default", "search": "box", "search_distance": 0.1, "segments": 1, "slaves": 1}
+    ]
     slave = report["slaves"][0]
     assert (slave["id"], slave["number"], slave["tie"], slave["segment"]) == (101, 1, "weld", 1)
     assert slave["xi"] == pytest.approx(-0.4, abs=1e-14) and slave["eta"] == pytest.approx(0.2, abs=1e-14)
@@ -400,8 +489,10 @@ def test_report_of_the_example(weld):
 def test_added_inertia_adds_up_over_slaves(weld):
     """Rows per slave (computed for the report) against the solver's own sums per master, THEORY 4."""
     weld["mesh"]["nodes"] += [[102, 0.12, 0.04, 0.01], [103, 0.05, 0.02, -0.02]]
-    weld["node"] = [{"nodes": "all", "rotations": True, "mass": 1.0, "inertia": 1e-3},
-                    {"nodes": [101, 102, 103], "mass": 0.7, "inertia": 2e-4}]
+    weld["node"] = [
+        {"nodes": "all", "rotations": True, "mass": 1.0, "inertia": 1e-3},
+        {"nodes": [101, 102, 103], "mass": 0.7, "inertia": 2e-4},
+    ]
     weld["tie"][0]["slaves"] = [101, 102]
     weld["tie"].append({"name": "glue", "slaves": [103], "formulation": "optimized"})
     report = found(weld)
@@ -427,12 +518,16 @@ def test_unused_rotations_are_named(weld):
     weld["node"] = [{"nodes": "all", "motion": "free", "mass": 1.0, "rotations": True}]
     weld["tie"][0]["formulation"] = "optimized"
     freedoms = found(weld)["freedoms"]
-    assert freedoms == {"translations": 12, "rotations": 0,
-                        "left_out": [f"rotations of node {i}" for i in (1, 2, 3, 4)]}
+    assert freedoms == {
+        "translations": 12,
+        "rotations": 0,
+        "left_out": [f"rotations of node {i}" for i in (1, 2, 3, 4)],
+    }
 
 
 def test_text_shows_twenty_slaves_and_counts_the_rest(weld):
     from tiefmu.report import text
+
     for k in range(30):
         weld["mesh"]["nodes"].append([200 + k, 0.001 * k, 0.05, 0.0])
     weld["tie"][0]["slaves"] += list(range(200, 230))
@@ -452,6 +547,7 @@ def test_a_dict_may_hold_numpy_arrays(weld):
 
 # -------------------------------------------------------------------------------------------------------------- archive
 
+
 def test_two_builds_are_byte_identical(weld, tmp_path):
     one = tiefmu.build(tiefmu.load(weld), tmp_path / "one.fmu")
     two = tiefmu.build(tiefmu.load(copy.deepcopy(weld)), str(tmp_path / "two.fmu"))
@@ -462,11 +558,18 @@ def test_two_builds_are_byte_identical(weld, tmp_path):
 def test_archive(weld, tmp_path):
     with zipfile.ZipFile(tiefmu.build(tiefmu.load(weld), tmp_path / "weld.fmu")) as archive:
         infos = archive.infolist()
-        assert [info.filename for info in infos] == \
-            [f"binaries/{package.PLATFORM}/scene{package.SUFFIX}", "documentation/index.html",
-             *(f"documentation/licenses/{name}.txt" for name in ("cereal", "fmi", "license")),
-             "extra/tiefmu/reference_in.csv", "extra/tiefmu/reference_out.csv", "model.png", "modelDescription.xml",
-             "resources/report.json", "resources/scene.bin", "terminalsAndIcons/terminalsAndIcons.xml"]
+        assert [info.filename for info in infos] == [
+            f"binaries/{package.PLATFORM}/scene{package.SUFFIX}",
+            "documentation/index.html",
+            *(f"documentation/licenses/{name}.txt" for name in ("cereal", "fmi", "license")),
+            "extra/tiefmu/reference_in.csv",
+            "extra/tiefmu/reference_out.csv",
+            "model.png",
+            "modelDescription.xml",
+            "resources/report.json",
+            "resources/scene.bin",
+            "terminalsAndIcons/terminalsAndIcons.xml",
+        ]
         assert {info.date_time for info in infos} == {(1980, 1, 1, 0, 0, 0)}
         assert {info.compress_type for info in infos} == {zipfile.ZIP_DEFLATED}
         assert [oct(info.external_attr >> 16) for info in infos] == ["0o755"] + ["0o644"] * 11
@@ -479,10 +582,17 @@ def guid(scene: dict) -> str:
 
 
 def test_guid_changes_with_what_matters_only(weld):
-    changes = [("title", "other"), (("node", 1, "mass"), 0.8), (("mesh", "nodes", 4), [101, 0.03, 0.06, 0.05]),
-               (("mesh", "nodes", 4), [102, 0.03, 0.06, 0.04]), (("tie", 0, "formulation"), "optimized"),
-               (("node", 0, "motion"), "free"), ("model", {"geometry": "small"}),
-               ("interface", {"expose": ["slave.r"]}), ("model", {"gravity": [0, 0, -9.81]})]
+    changes = [
+        ("title", "other"),
+        (("node", 1, "mass"), 0.8),
+        (("mesh", "nodes", 4), [101, 0.03, 0.06, 0.05]),
+        (("mesh", "nodes", 4), [102, 0.03, 0.06, 0.04]),
+        (("tie", 0, "formulation"), "optimized"),
+        (("node", 0, "motion"), "free"),
+        ("model", {"geometry": "small"}),
+        ("interface", {"expose": ["slave.r"]}),
+        ("model", {"gravity": [0, 0, -9.81]}),
+    ]
     guids = [guid(weld)]
     for path, value in changes:
         scene = copy.deepcopy(weld)

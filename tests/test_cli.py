@@ -9,7 +9,6 @@ import zipfile
 
 import numpy as np
 import pytest
-
 import tiefmu
 from conftest import toml
 from tiefmu import cli, package
@@ -51,6 +50,7 @@ def test_build_of_many_variables_names_ports_as_the_cure(weld, scene_file, capsy
         weld["tie"][0]["slaves"] = ids
         assert main(["build", scene_file(weld)]) == 0
         return capsys.readouterr()
+
     said = said_with(1662)  # 6 variables a slave, 7 a master
     assert ", 10000 variables, " in said.out and "ports" not in said.err
     said = said_with(1663)
@@ -69,8 +69,15 @@ def test_info_of_a_scene_and_of_its_fmu_are_the_same(weld, scene_file, capsys):
     assert main(["info", "weld.fmu"]) == 0
     text = capsys.readouterr().out
     assert text.startswith("weld.fmu: Spot weld on a quarter panel\n1 tie, 1 slave, 4 masters")
-    for needed in ("tie 'weld': default formulation, search 'box' within 0.1 m", "-0.40000", "0.28000 -> 1: 0.196, 0",
-                   "stable  no limit", "nodal   no limit", "freedoms: 12 translations, 0 rotations", "warning: "):
+    for needed in (
+        "tie 'weld': default formulation, search 'box' within 0.1 m",
+        "-0.40000",
+        "0.28000 -> 1: 0.196, 0",
+        "stable  no limit",
+        "nodal   no limit",
+        "freedoms: 12 translations, 0 rotations",
+        "warning: ",
+    ):
         assert needed in text
 
 
@@ -82,8 +89,9 @@ def test_run_writes_csv_and_picture(weld, scene_file, capsys, tmp_path, argument
     assert main([*arguments, "--input", "in.csv", "--step", "0.25", "--output", "out.csv", "--plot", "out.png"]) == 0
     assert capsys.readouterr().out == f"{arguments[1]}: 4 steps to t = 1 s, 15 outputs, wrote out.csv, wrote out.png\n"
     header, values = rows("out.csv")
-    assert header[0] == "time" and set(header[1:]) == \
-        {f"slave[1].v[{k}]" for k in (1, 2, 3)} | {f"master[{i}].f[{k}]" for i in (1, 2, 3, 4) for k in (1, 2, 3)}
+    assert header[0] == "time" and set(header[1:]) == {f"slave[1].v[{k}]" for k in (1, 2, 3)} | {
+        f"master[{i}].f[{k}]" for i in (1, 2, 3, 4) for k in (1, 2, 3)
+    }
     table = dict(zip(header, values.T))
     assert table["time"].tolist() == [0, 0.25, 0.5, 0.75, 1.0]
     # row k answers the inputs of the start of step k
@@ -103,6 +111,7 @@ def test_run_prints_a_summary_without_output_files(weld, scene_file, capsys):
 
 def test_run_takes_the_default_experiment_of_the_fmu(free, scene_file, capsys):
     import fmpy
+
     main(["build", scene_file(free)])
     experiment = fmpy.read_model_description("weld.fmu").defaultExperiment
     assert main(["run", "weld.fmu", "--output", "out.csv"]) == 0
@@ -120,13 +129,17 @@ def test_a_time_given_twice_is_a_jump(weld, scene_file, tmp_path):
 
 
 INPUTS = {
-    "unknown column": ("time,slave[1].g[3]\n0,0\n",
-                       "in.csv: column 'slave[1].g[3]': no such variable; did you mean 'slave[1].f[3]'?"),
+    "unknown column": (
+        "time,slave[1].g[3]\n0,0\n",
+        "in.csv: column 'slave[1].g[3]': no such variable; did you mean 'slave[1].f[3]'?",
+    ),
     "output": ("time,slave[1].v[3]\n0,0\n", "in.csv: column 'slave[1].v[3]' is no input but of causality output"),
     "repeated column": ("time,slave[1].f[3],slave[1].f[3]\n0,0,0\n", "in.csv: column 'slave[1].f[3]' is repeated"),
     "no time": ("t,slave[1].f[3]\n0,0\n", "in.csv: has no column 'time'; found t, slave[1].f[3]"),
-    "time goes back": ("time,slave[1].f[3]\n0,0\n1,0\n\n0.5,0\n",
-                       "in.csv: line 5: time goes back from 1 to 0.5 s; times must not decrease"),
+    "time goes back": (
+        "time,slave[1].f[3]\n0,0\n1,0\n\n0.5,0\n",
+        "in.csv: line 5: time goes back from 1 to 0.5 s; times must not decrease",
+    ),
     "text": ("time,slave[1].f[3]\n0,x\n", "in.csv: line 2: slave[1].f[3]: expected a number, found 'x'"),
     "nan": ("time,slave[1].f[3]\n0,nan\n", "in.csv: line 2: slave[1].f[3]: nan is not a finite number"),
     "short row": ("time,slave[1].f[3]\n0,0\n1\n", "in.csv: line 3: expected 2 values, found 1"),
@@ -149,21 +162,24 @@ def test_wrong_inputs(weld, scene_file, capsys, tmp_path, case):
     assert not (tmp_path / "out.csv").exists()
 
 
-@pytest.mark.parametrize("arguments, line", [
-    (["run", "no.fmu"], "no.fmu: no such file"),
-    (["info", "no.fmu"], "no.fmu: no such file"),
-    (["info", "text.fmu"], "text.fmu: not an FMU (a zip archive)"),
-    (["run", "text.fmu"], "text.fmu: not an FMU that FMPy can read: File is not a zip file"),
-    (["info", "foreign.fmu"], "foreign.fmu: holds no resources/report.json, so it was not made by tiefmu"),
-    (["info", "list.fmu"], "list.fmu: its resources/report.json is none of tiefmu"),
-    (["info", "damaged.fmu"], "damaged.fmu: not an FMU (a zip archive)"),
-    (["run", "damaged.fmu"], "damaged.fmu: cannot be unpacked: Bad CRC-32 for file 'resources/report.json'"),
-    (["run", "weld.toml", "--output", "no/out.csv"], "no/out.csv: folder no does not exist"),
-    (["run", "weld.toml", "--plot", "no/out.png"], "no/out.png: folder no does not exist"),
-    (["build", "weld.toml", "-o", "no/weld.fmu"], "no/weld.fmu: folder no does not exist"),
-    (["build", "weld.toml", "-o", "folder"], "folder: is a folder"),
-    (["demo", "--scenes", "folder"], "folder: no scenes here; give the folder with --scenes"),
-])
+@pytest.mark.parametrize(
+    "arguments, line",
+    [
+        (["run", "no.fmu"], "no.fmu: no such file"),
+        (["info", "no.fmu"], "no.fmu: no such file"),
+        (["info", "text.fmu"], "text.fmu: not an FMU (a zip archive)"),
+        (["run", "text.fmu"], "text.fmu: not an FMU that FMPy can read: File is not a zip file"),
+        (["info", "foreign.fmu"], "foreign.fmu: holds no resources/report.json, so it was not made by tiefmu"),
+        (["info", "list.fmu"], "list.fmu: its resources/report.json is none of tiefmu"),
+        (["info", "damaged.fmu"], "damaged.fmu: not an FMU (a zip archive)"),
+        (["run", "damaged.fmu"], "damaged.fmu: cannot be unpacked: Bad CRC-32 for file 'resources/report.json'"),
+        (["run", "weld.toml", "--output", "no/out.csv"], "no/out.csv: folder no does not exist"),
+        (["run", "weld.toml", "--plot", "no/out.png"], "no/out.png: folder no does not exist"),
+        (["build", "weld.toml", "-o", "no/weld.fmu"], "no/weld.fmu: folder no does not exist"),
+        (["build", "weld.toml", "-o", "folder"], "folder: is a folder"),
+        (["demo", "--scenes", "folder"], "folder: no scenes here; give the folder with --scenes"),
+    ],
+)
 def test_wrong_files(weld, scene_file, capsys, tmp_path, arguments, line):
     scene_file(weld)
     (tmp_path / "folder").mkdir()
@@ -184,8 +200,10 @@ def test_wrong_files(weld, scene_file, capsys, tmp_path, arguments, line):
     assert sorted(tmp_path.rglob("*")) == before
 
 
-@pytest.mark.parametrize("option, value", [("--step", "0"), ("--step", "-1"), ("--step", "x"), ("--stop-time", "nan"),
-                                           ("--stop-time", "inf")])
+@pytest.mark.parametrize(
+    "option, value",
+    [("--step", "0"), ("--step", "-1"), ("--step", "x"), ("--stop-time", "nan"), ("--stop-time", "inf")],
+)
 def test_steps_and_times_must_be_positive(weld, scene_file, capsys, option, value):
     with pytest.raises(SystemExit) as stop:
         main(["run", scene_file(weld), f"{option}={value}"])
@@ -207,8 +225,11 @@ def test_exit_statuses_of_the_process(weld, scene_file, command):
     assert good.returncode == 0 and good.stdout.startswith("weld.fmu: ")
     weld["tie"][0]["slaves"] = [999]
     bad = command("build", scene_file(weld))
-    assert (bad.returncode, bad.stdout, bad.stderr) == \
-        (2, "", "error: weld.toml: tie 'weld': slaves: node 999 is not in the mesh (ids 1..101)\n")
+    assert (bad.returncode, bad.stdout, bad.stderr) == (
+        2,
+        "",
+        "error: weld.toml: tie 'weld': slaves: node 999 is not in the mesh (ids 1..101)\n",
+    )
     nothing = command()
     assert nothing.returncode == 2 and "COMMAND" in nothing.stderr and "Traceback" not in nothing.stderr
 
@@ -230,6 +251,7 @@ def test_version(capsys):
 def test_interrupt_ends_quietly(monkeypatch, capsys):
     def interrupted(options):
         raise KeyboardInterrupt
+
     monkeypatch.setattr(cli, "run_build", interrupted)
     assert main(["build", "weld.toml"]) == 130
     assert capsys.readouterr() == ("", "")
@@ -237,6 +259,7 @@ def test_interrupt_ends_quietly(monkeypatch, capsys):
 
 def test_interrupt_of_a_running_simulation(weld, scene_file, monkeypatch, capsys, tmp_path):
     import tqdm
+
     monkeypatch.setattr(tqdm.tqdm, "update", lambda bar, amount: signal.raise_signal(signal.SIGINT))
     before = signal.signal(signal.SIGINT, signal.default_int_handler)  # a test runner may ignore it in its workers
     try:
@@ -249,8 +272,13 @@ def test_interrupt_of_a_running_simulation(weld, scene_file, monkeypatch, capsys
 
 def test_reader_that_stops_reading(weld, scene_file, tmp_path):
     """As in `tiefmu info weld.toml --json | head -0`."""
-    process = subprocess.Popen([sys.executable, "-m", "tiefmu.cli", "info", scene_file(weld), "--json"], cwd=tmp_path,
-                               stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    process = subprocess.Popen(
+        [sys.executable, "-m", "tiefmu.cli", "info", scene_file(weld), "--json"],
+        cwd=tmp_path,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
     process.stdout.close()
     assert process.stderr.read() == ""
     assert process.wait() == 0
@@ -270,8 +298,10 @@ def test_demo(free, tmp_path, capsys):
 
 def test_demo_reports_a_check_that_fails():
     from tiefmu.demo import check
-    good = np.array([(0.0, 1.0, 1e-15), (1.0, 2.0, 2e-15)], dtype=[("time", float), ("slave[1].v[1]", float),
-                                                                  ("drift", float)])
+
+    good = np.array(
+        [(0.0, 1.0, 1e-15), (1.0, 2.0, 2e-15)], dtype=[("time", float), ("slave[1].v[1]", float), ("drift", float)]
+    )
     assert all(one.held for one in check(good))
     broken = good.copy()
     broken["slave[1].v[1]"][1] = np.nan

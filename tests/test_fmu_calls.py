@@ -8,7 +8,6 @@ from ctypes import byref, c_char_p, c_double, c_int, c_size_t, c_uint, c_void_p
 
 import numpy as np
 import pytest
-
 from fmu_calls import DISCARD, ERROR, OK, WARNING, Fmu, Instance
 from fmu_scenes import any_fmu, fmu, loose, random_values  # noqa: F401 (fixtures)
 
@@ -21,18 +20,58 @@ def diverged(loose) -> Instance:
 
 # ------------------------------------------------------------------------------------------- the library and its states
 
-COMMON = ["GetTypesPlatform", "GetVersion", "SetDebugLogging", "Instantiate", "FreeInstance", "SetupExperiment",
-          "EnterInitializationMode", "ExitInitializationMode", "Terminate", "Reset", "GetReal", "GetInteger",
-          "GetBoolean", "GetString", "SetReal", "SetInteger", "SetBoolean", "SetString", "GetFMUstate", "SetFMUstate",
-          "FreeFMUstate", "SerializedFMUstateSize", "SerializeFMUstate", "DeSerializeFMUstate",
-          "GetDirectionalDerivative"]
-CO_SIMULATION = ["SetRealInputDerivatives", "GetRealOutputDerivatives", "DoStep", "CancelStep", "GetStatus",
-                 "GetRealStatus", "GetIntegerStatus", "GetBooleanStatus", "GetStringStatus"]
+COMMON = [
+    "GetTypesPlatform",
+    "GetVersion",
+    "SetDebugLogging",
+    "Instantiate",
+    "FreeInstance",
+    "SetupExperiment",
+    "EnterInitializationMode",
+    "ExitInitializationMode",
+    "Terminate",
+    "Reset",
+    "GetReal",
+    "GetInteger",
+    "GetBoolean",
+    "GetString",
+    "SetReal",
+    "SetInteger",
+    "SetBoolean",
+    "SetString",
+    "GetFMUstate",
+    "SetFMUstate",
+    "FreeFMUstate",
+    "SerializedFMUstateSize",
+    "SerializeFMUstate",
+    "DeSerializeFMUstate",
+    "GetDirectionalDerivative",
+]
+CO_SIMULATION = [
+    "SetRealInputDerivatives",
+    "GetRealOutputDerivatives",
+    "DoStep",
+    "CancelStep",
+    "GetStatus",
+    "GetRealStatus",
+    "GetIntegerStatus",
+    "GetBooleanStatus",
+    "GetStringStatus",
+]
 
 # Refused, but there: some importers look up every function of the standard.
-MODEL_EXCHANGE = ["EnterEventMode", "NewDiscreteStates", "EnterContinuousTimeMode", "CompletedIntegratorStep",
-                  "SetTime", "SetContinuousStates", "GetDerivatives", "GetEventIndicators", "GetContinuousStates",
-                  "GetNominalsOfContinuousStates"]
+MODEL_EXCHANGE = [
+    "EnterEventMode",
+    "NewDiscreteStates",
+    "EnterContinuousTimeMode",
+    "CompletedIntegratorStep",
+    "SetTime",
+    "SetContinuousStates",
+    "GetDerivatives",
+    "GetEventIndicators",
+    "GetContinuousStates",
+    "GetNominalsOfContinuousStates",
+]
 
 
 def elf_exports(data: bytes) -> set[str]:
@@ -45,7 +84,7 @@ def elf_exports(data: bytes) -> set[str]:
     for at in range(symbols[4], symbols[4] + symbols[5], 24):
         name, info, _, section = struct.unpack_from("<IBBH", data, at)
         if section and info >> 4:
-            found.add(data[names + name:data.index(b"\0", names + name)].decode())
+            found.add(data[names + name : data.index(b"\0", names + name)].decode())
     return found
 
 
@@ -118,19 +157,33 @@ def test_calls_are_allowed_where_the_standard_says(loose, state):
     nothing, value = (None, c_size_t(0), None), (c_double * 1)()
     saved, size, data = c_void_p(), c_size_t(), ctypes.create_string_buffer(100000)
     arguments = {
-        "SetDebugLogging": (1, c_size_t(0), None), "SetupExperiment": (0, c_double(0), c_double(0), 0, c_double(0)),
-        "EnterInitializationMode": (), "ExitInitializationMode": (), "Terminate": (), "Reset": (),
-        **{get_or_set + kind: nothing for get_or_set in ("Get", "Set")
-           for kind in ("Real", "Integer", "Boolean", "String")},
-        "GetFMUstate": (byref(c_void_p()),), "FreeFMUstate": (byref(c_void_p()),),
-        "SerializedFMUstateSize": (saved, byref(size)), "SerializeFMUstate": (saved, data, c_size_t(len(data))),
-        "DeSerializeFMUstate": (data, size, byref(c_void_p())), "SetFMUstate": (saved,),
+        "SetDebugLogging": (1, c_size_t(0), None),
+        "SetupExperiment": (0, c_double(0), c_double(0), 0, c_double(0)),
+        "EnterInitializationMode": (),
+        "ExitInitializationMode": (),
+        "Terminate": (),
+        "Reset": (),
+        **{
+            get_or_set + kind: nothing
+            for get_or_set in ("Get", "Set")
+            for kind in ("Real", "Integer", "Boolean", "String")
+        },
+        "GetFMUstate": (byref(c_void_p()),),
+        "FreeFMUstate": (byref(c_void_p()),),
+        "SerializedFMUstateSize": (saved, byref(size)),
+        "SerializeFMUstate": (saved, data, c_size_t(len(data))),
+        "DeSerializeFMUstate": (data, size, byref(c_void_p())),
+        "SetFMUstate": (saved,),
         "GetDirectionalDerivative": (None, c_size_t(0), None, c_size_t(0), None, None),
         "SetRealInputDerivatives": (None, c_size_t(0), None, None),
         "GetRealOutputDerivatives": (None, c_size_t(0), None, None),
-        "DoStep": (c_double(0), c_double(0.1), 0), "CancelStep": (),
-        "GetStatus": (0, value), "GetRealStatus": (2, value), "GetIntegerStatus": (2, value),
-        "GetBooleanStatus": (3, value), "GetStringStatus": (1, value),
+        "DoStep": (c_double(0), c_double(0.1), 0),
+        "CancelStep": (),
+        "GetStatus": (0, value),
+        "GetRealStatus": (2, value),
+        "GetIntegerStatus": (2, value),
+        "GetBooleanStatus": (3, value),
+        "GetStringStatus": (1, value),
     }
     assert set(arguments) == set(ALLOWED)
     for function, states in ALLOWED.items():
@@ -189,6 +242,7 @@ def test_variables_are_real_only(fmu):
 
 # ------------------------------------------------------------------------------------------------------- instantiation
 
+
 def refused(fmu, **arguments) -> str:
     instance = Instance(fmu, **arguments)
     assert instance.component is None
@@ -217,7 +271,7 @@ def test_null_arguments(fmu):
     location = (fmu.folder / "resources").as_uri().encode()
     good = [b"tie", 1, fmu.description.guid.encode(), location, byref(callbacks), 0, 0]
     for place in (0, 2, 3, 4):
-        assert fmu.library.fmi2Instantiate(*good[:place], None, *good[place + 1:]) is None
+        assert fmu.library.fmi2Instantiate(*good[:place], None, *good[place + 1 :]) is None
 
 
 def test_a_logger_may_be_missing(fmu):
@@ -238,8 +292,12 @@ def test_forms_of_the_resource_location(fmu, tmp_path, form):
     folder.mkdir()
     (folder / "scene.bin").write_bytes((fmu.folder / "resources" / "scene.bin").read_bytes())
     uri = folder.as_uri()
-    location = form.format(uri=uri, single=uri.replace("file:///", "file:/"), path=folder,
-                           local=uri.replace("file:///", "file://localhost/"))
+    location = form.format(
+        uri=uri,
+        single=uri.replace("file:///", "file:/"),
+        path=folder,
+        local=uri.replace("file:///", "file://localhost/"),
+    )
     before = os.getcwd()
     instance = Instance(fmu, location=location)
     assert instance.component, instance.log
@@ -267,13 +325,13 @@ def test_damaged_resources_end_in_a_message(loose, tmp_path):
     for length in [*range(header + 2), *rng.integers(header, len(good), 50)]:
         assert attempt(good[:length]).component is None
     for at in [*range(header), *rng.integers(header, len(good), 50)]:
-        assert attempt(good[:at] + bytes([good[at] ^ rng.integers(1, 256)]) + good[at + 1:]).component is None
+        assert attempt(good[:at] + bytes([good[at] ^ rng.integers(1, 256)]) + good[at + 1 :]).component is None
     accepted = 0
     for _ in range(400):
         body = bytearray(good[header:])
         for at in rng.integers(1, len(body), rng.integers(1, 4)):
-            body[at] = rng.choice([0, 1, 0x7f, 0x80, 0xff, rng.integers(256)])
-        instance = attempt(good[:header - 8] + struct.pack("<Q", checksum(body)) + bytes(body))
+            body[at] = rng.choice([0, 1, 0x7F, 0x80, 0xFF, rng.integers(256)])
+        instance = attempt(good[: header - 8] + struct.pack("<Q", checksum(body)) + bytes(body))
         if instance.component:  # a changed number, say
             accepted += 1
             instance.free()
@@ -283,6 +341,7 @@ def test_damaged_resources_end_in_a_message(loose, tmp_path):
 
 
 # -------------------------------------------------------------------------------------------------------- get and set
+
 
 def test_gets_in_any_order_give_the_same(any_fmu):
     rng = np.random.default_rng(8)
@@ -328,8 +387,9 @@ def test_the_last_outputs_can_be_read_after_termination(any_fmu):
     unread.free()
 
 
-@pytest.mark.parametrize("value, text", [(np.nan, "NaN"), (np.inf, "an infinite value"),
-                                         (-np.inf, "an infinite value")])
+@pytest.mark.parametrize(
+    "value, text", [(np.nan, "NaN"), (np.inf, "an infinite value"), (-np.inf, "an infinite value")]
+)
 def test_values_that_are_not_finite_change_nothing(fmu, value, text):
     instance = Instance(fmu).start(values={"slave[1].f[1]": 1.5})
     names = fmu.names("input")
@@ -374,13 +434,18 @@ def test_only_inputs_and_in_time_parameters_can_be_set(fmu):
         if states == "step":
             assert instance.call("ExitInitializationMode") == OK
         assert instance.set({"slave[1].f[1]": 0.5}) == OK
-        for name, why in (("slave[1].v[1]", "is an output"), ("master[3].v[2]", "is an output"),
-                          ("master[1].added_mass", "is calculated"), ("stable_time_step", "is an output")):
+        for name, why in (
+            ("slave[1].v[1]", "is an output"),
+            ("master[3].v[2]", "is an output"),
+            ("master[1].added_mass", "is calculated"),
+            ("stable_time_step", "is an output"),
+        ):
             assert instance.set({"slave[1].f[1]": 0.7, name: 1.0}) == ERROR
             assert instance.errors()[-1] == f"fmi2SetReal: variable '{name}' {why} and cannot be set"
         assert instance.set({"slave[1].mass": 1.25}) == parameter
-    assert instance.errors()[-1] == ("fmi2SetReal: variable 'slave[1].mass' is fixed after the initialisation and "
-                                     "cannot be set")
+    assert instance.errors()[-1] == (
+        "fmi2SetReal: variable 'slave[1].mass' is fixed after the initialisation and cannot be set"
+    )
     assert instance.get(["slave[1].f[1]", "slave[1].mass"]).tolist() == [0.5, 1.25]
     instance.free()
 
@@ -411,10 +476,19 @@ def test_parameters_that_make_no_sense_are_an_error_and_reset_recovers(loose):
 
 # -------------------------------------------------------------------------------------------------------------- steps
 
+
 def test_refused_steps(fmu):
     instance = Instance(fmu).start(time=2.0, stop=3.0)
-    for time, size in ((2.0, 0.0), (2.0, -0.1), (2.0, np.nan), (2.0, np.inf), (1.9, 0.1), (2.1, 0.1), (np.nan, 0.1),
-                       (2.0, 1.1)):
+    for time, size in (
+        (2.0, 0.0),
+        (2.0, -0.1),
+        (2.0, np.nan),
+        (2.0, np.inf),
+        (1.9, 0.1),
+        (2.1, 0.1),
+        (np.nan, 0.1),
+        (2.0, 1.1),
+    ):
         assert instance.step(time, size) == ERROR
         assert instance.errors()[-1].startswith("fmi2DoStep: the step ")
     assert len(instance.errors()) == 8
@@ -461,11 +535,15 @@ def test_divergence_names_variable_and_time_and_keeps_the_last_state(loose):  # 
 def test_driven_nodes_carried_out_of_the_world(formulation, tmp_path):
     """Positions that overflow, and a segment whose nodes fall together, while the FMU integrates nothing else."""
     rotations = formulation == "default"
-    driven = {"mesh": {"nodes": [[1, 0, 0, 0], [2, 1, 0, 0], [3, 1, 1, 0], [4, 0, 1, 0], [101, 0.3, 0.6, 0.5]],
-                       "segments": [[1, 1, 2, 3, 4]]},
-              "node": [{"nodes": "all", "rotations": rotations}],
-              "tie": [{"name": "tie", "slaves": [101], "formulation": formulation}],
-              "interface": {"expose": ["master.r", "slave.r"]}}
+    driven = {
+        "mesh": {
+            "nodes": [[1, 0, 0, 0], [2, 1, 0, 0], [3, 1, 1, 0], [4, 0, 1, 0], [101, 0.3, 0.6, 0.5]],
+            "segments": [[1, 1, 2, 3, 4]],
+        },
+        "node": [{"nodes": "all", "rotations": rotations}],
+        "tie": [{"name": "tie", "slaves": [101], "formulation": formulation}],
+        "interface": {"expose": ["master.r", "slave.r"]},
+    }
     driven = Fmu(driven, tmp_path)
     instance = Instance(driven).start(values={"master[2].v[3]": 0.25, "master[4].v[1]": 0.125})
     assert instance.step(0, 0.5) == OK
@@ -481,8 +559,9 @@ def test_driven_nodes_carried_out_of_the_world(formulation, tmp_path):
         return
     instance = Instance(driven).start()
     corners = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
-    fall = dict(zip([f"master[{i}].v[{k}]" for i in (1, 2, 3, 4) for k in (1, 2, 3)],
-                    ([0.5, 0.5, 0] - corners).ravel()))
+    fall = dict(
+        zip([f"master[{i}].v[{k}]" for i in (1, 2, 3, 4) for k in (1, 2, 3)], ([0.5, 0.5, 0] - corners).ravel())
+    )
     assert instance.set(fall) == OK
     assert instance.step(0, 0.5) == OK
     before = instance.get(names)
@@ -494,9 +573,14 @@ def test_driven_nodes_carried_out_of_the_world(formulation, tmp_path):
 
 def test_driven_nodes_put_into_one_point(tmp_path):
     """Positions as inputs: what the segment's motion would be is not defined, so that there is nothing to get."""
-    scene = {"mesh": {"nodes": [[1, 0, 0, 0], [2, 1, 0, 0], [3, 1, 1, 0], [4, 0, 1, 0], [101, 0.3, 0.6, 0.5]],
-                      "segments": [[1, 1, 2, 3, 4]]},
-             "tie": [{"name": "tie", "slaves": [101], "formulation": "optimized"}], "model": {"position": "input"}}
+    scene = {
+        "mesh": {
+            "nodes": [[1, 0, 0, 0], [2, 1, 0, 0], [3, 1, 1, 0], [4, 0, 1, 0], [101, 0.3, 0.6, 0.5]],
+            "segments": [[1, 1, 2, 3, 4]],
+        },
+        "tie": [{"name": "tie", "slaves": [101], "formulation": "optimized"}],
+        "model": {"position": "input"},
+    }
     squashed = Fmu(scene, tmp_path)
     point = {f"master[{i}].r[{k}]": 0.5 for i in (1, 2, 3, 4) for k in (1, 2, 3)}
     output = [squashed.reference["slave[1].v[1]"]]
@@ -525,10 +609,15 @@ def test_cancelling_is_refused_because_no_step_is_ever_in_progress(fmu):  # noqa
 
 
 STIFF = {  # a driven shell quad with declared mass and stiffness: steps above sqrt(2 m/K) are too long for an explicit host
-    "mesh": {"nodes": [[1, 0, 0, 0], [2, 1, 0, 0], [3, 1, 1, 0], [4, 0, 1, 0], [101, 0.5, 0.5, 0]],
-             "segments": [[1, 1, 2, 3, 4]]},
-    "node": [{"nodes": "all", "mass": 2.0, "stiffness": 1e4}, {"nodes": [3], "stiffness": 4e4},
-             {"nodes": [101], "mass": 4.0, "stiffness": 8e4}],
+    "mesh": {
+        "nodes": [[1, 0, 0, 0], [2, 1, 0, 0], [3, 1, 1, 0], [4, 0, 1, 0], [101, 0.5, 0.5, 0]],
+        "segments": [[1, 1, 2, 3, 4]],
+    },
+    "node": [
+        {"nodes": "all", "mass": 2.0, "stiffness": 1e4},
+        {"nodes": [3], "stiffness": 4e4},
+        {"nodes": [101], "mass": 4.0, "stiffness": 8e4},
+    ],
     "tie": [{"name": "tie", "slaves": [101]}],
 }
 
@@ -540,6 +629,7 @@ def test_a_communication_step_too_long_for_the_masters_is_warned_of_once(tmp_pat
 
     def warnings():
         return [(m[3], m[5]) for m in instance.log if m[2] == WARNING]
+
     time = 0.0
     for factor, count in ((0.5, 0), (0.999, 0), (1.001, 1), (3.0, 1), (0.5, 1)):
         assert instance.step(time, factor * limit) == OK
@@ -567,7 +657,6 @@ def test_no_warning_where_nothing_is_declared(tmp_path):
         assert instance.step(0, 100.0) == OK
         assert not [m for m in instance.log if m[2] == WARNING]
         instance.free()
-
 
 
 def test_experiments_that_make_no_sense(fmu):

@@ -2,12 +2,19 @@
 
 import numpy as np
 import pytest
-
 from fmu_calls import OK, Fmu, Instance
 from fmu_scenes import SETTINGS, random_values, scene
 
-DIAGNOSTICS = {"stable_time_step", "nodal_time_step", "power_residual", "energy.kinetic", "energy.strain",
-               "energy.dissipated", "energy.external", "energy.residual"}
+DIAGNOSTICS = {
+    "stable_time_step",
+    "nodal_time_step",
+    "power_residual",
+    "energy.kinetic",
+    "energy.strain",
+    "energy.dissipated",
+    "energy.external",
+    "energy.residual",
+}
 
 
 def declared(unknowns) -> dict[str, dict[str, str]]:
@@ -47,8 +54,9 @@ def compare(slope, knowns, unknowns, lists):
         assert depends == set(lists[unknown]), unknown
         for k, name in enumerate(knowns):
             if lists[unknown].get(name) == "constant":
-                np.testing.assert_allclose(slope[:, k, u], slope[0, k, u], rtol=1e-6, atol=100 * limit[u],
-                                           err_msg=f"{unknown} <- {name}")
+                np.testing.assert_allclose(
+                    slope[:, k, u], slope[0, k, u], rtol=1e-6, atol=100 * limit[u], err_msg=f"{unknown} <- {name}"
+                )
 
 
 @pytest.mark.parametrize("settings", SETTINGS, ids=lambda s: "-".join(map(str, s)))

@@ -5,14 +5,18 @@ from ctypes import c_double, c_int, c_size_t, c_uint
 
 import numpy as np
 import pytest
-
 from differences import check_derivatives, directional
 from fmu_calls import ERROR, OK, Fmu, Instance, set_derivatives
 from fmu_scenes import ALL_FREE, DRIVEN, MIXED, random_values, scene
 
 KINDS = [("default", True), ("default", False), ("optimized", True), ("optimized", False)]
-INERTIAS = [("lumped", "loads"), ("lumped", "full"), ("consistent", "loads"), ("consistent", "full"),
-            ("consistent", "split")]
+INERTIAS = [
+    ("lumped", "loads"),
+    ("lumped", "full"),
+    ("consistent", "loads"),
+    ("consistent", "full"),
+    ("consistent", "split"),
+]
 GEOMETRIES = [("finite", "integrated"), ("finite", "input"), ("small", "integrated"), ("small", "input")]
 
 
@@ -102,14 +106,26 @@ def test_other_variables_are_refused(fmu):
     one, many = (c_double * 1)(1.0), len(fmu.reference)
 
     def ask(unknown, knowns, seed=one, change=one):
-        return instance.call("GetDirectionalDerivative", (c_uint * 1)(unknown), c_size_t(1), (c_uint * 1)(knowns),
-                             c_size_t(1), seed, change)
+        return instance.call(
+            "GetDirectionalDerivative",
+            (c_uint * 1)(unknown),
+            c_size_t(1),
+            (c_uint * 1)(knowns),
+            c_size_t(1),
+            seed,
+            change,
+        )
+
     assert ask(output, known) == OK
     for unknown, knowns, words in (
-            (known, known, "'slave[1].f[1]' is not an output"), (parameter, known, "'slave[1].mass' is not an output"),
-            (calculated, known, "is not an output"), (output, output, "'slave[1].v[1]' is not an input"),
-            (output, parameter, "is not an input"), (many, known, "unknown value reference"),
-            (output, many, "unknown value reference")):
+        (known, known, "'slave[1].f[1]' is not an output"),
+        (parameter, known, "'slave[1].mass' is not an output"),
+        (calculated, known, "is not an output"),
+        (output, output, "'slave[1].v[1]' is not an input"),
+        (output, parameter, "is not an input"),
+        (many, known, "unknown value reference"),
+        (output, many, "unknown value reference"),
+    ):
         one[0] = 1.0
         assert ask(unknown, knowns) == ERROR and words in instance.errors()[-1]
         assert one[0] == 1.0
@@ -124,16 +140,25 @@ def test_other_variables_are_refused(fmu):
 # --------------------------------------------------------------------------------------------- inputs inside a step
 
 METHODS = ["central-difference", "symplectic-euler", "noh-bathe", "rk4"]
-LINEAR = np.array([0.3, -0.2, 0.5])      # m/s
-RATE = np.array([1.5, 0.7, -0.9])        # m/s2
-CURVATURE = np.array([-4.0, 2.0, 3.0])   # m/s3
+LINEAR = np.array([0.3, -0.2, 0.5])  # m/s
+RATE = np.array([1.5, 0.7, -0.9])  # m/s2
+CURVATURE = np.array([-4.0, 2.0, 3.0])  # m/s3
 
 
 def carried(mixed: bool, method: str, rotations=False) -> dict:
     """A quad of driven masters with a slave; mixed: a free point hangs on the slave by a bushing."""
     made = {
-        "mesh": {"nodes": [[1, 0, 0, 0], [2, 1, 0, 0], [3, 1, 1, 0], [4, 0, 1, 0], [101, 0.3, 0.6, 0.2],
-                           [201, 0.3, 0.6, 0.9]], "segments": [[1, 1, 2, 3, 4]]},
+        "mesh": {
+            "nodes": [
+                [1, 0, 0, 0],
+                [2, 1, 0, 0],
+                [3, 1, 1, 0],
+                [4, 0, 1, 0],
+                [101, 0.3, 0.6, 0.2],
+                [201, 0.3, 0.6, 0.9],
+            ],
+            "segments": [[1, 1, 2, 3, 4]],
+        },
         "node": [{"nodes": "all", "mass": 1.0, "rotations": rotations, "inertia": 0.1 if rotations else 0.0}],
         "tie": [{"name": "tie", "slaves": [101]}],
         "integrator": {"method": method},
@@ -174,13 +199,19 @@ def test_a_quadratic_velocity_of_an_all_driven_scene_too(method, tmp_path):
     places = [f"slave[1].r[{k}]" for k in (1, 2, 3)]
     instance = Instance(fmu).start(values=dict(zip(names, np.tile(LINEAR, 4))))
     start, step = instance.get(places), 0.25
-    assert set_derivatives(instance, names + names, [1] * 12 + [2] * 12,
-                           np.concatenate([np.tile(RATE, 4), np.tile(CURVATURE, 4)])) == OK
+    assert (
+        set_derivatives(
+            instance, names + names, [1] * 12 + [2] * 12, np.concatenate([np.tile(RATE, 4), np.tile(CURVATURE, 4)])
+        )
+        == OK
+    )
     assert instance.step(0, step) == OK
-    np.testing.assert_allclose(instance.get(places) - start,
-                               step * LINEAR + step**2 / 2 * RATE + step**3 / 6 * CURVATURE, rtol=1e-13)
-    np.testing.assert_allclose(instance.get(names), np.tile(LINEAR + step * RATE + step**2 / 2 * CURVATURE, 4),
-                               rtol=1e-14)
+    np.testing.assert_allclose(
+        instance.get(places) - start, step * LINEAR + step**2 / 2 * RATE + step**3 / 6 * CURVATURE, rtol=1e-13
+    )
+    np.testing.assert_allclose(
+        instance.get(names), np.tile(LINEAR + step * RATE + step**2 / 2 * CURVATURE, 4), rtol=1e-14
+    )
     # They held for that step only.
     before = instance.get(places)
     velocity = instance.get([f"slave[1].v[{k}]" for k in (1, 2, 3)])
@@ -192,10 +223,15 @@ def test_a_quadratic_velocity_of_an_all_driven_scene_too(method, tmp_path):
 @pytest.mark.parametrize("method", METHODS)
 def test_a_load_that_grows_inside_the_step(method, tmp_path):
     """A free mass under F = c t: v = c t^2 / 2m, to the order of the method with the substeps it takes."""
-    made = {"mesh": {"nodes": [[1, 0, 0, 0], [2, 1, 0, 0], [3, 1, 1, 0], [4, 0, 1, 0], [101, 0.5, 0.5, 0]],
-                     "segments": [[1, 1, 2, 3, 4]]},
-            "node": [{"nodes": "all", "motion": "free", "mass": 1.0}], "tie": [{"name": "tie", "slaves": [101]}],
-            "integrator": {"method": method, "time_step": 1e-3}}
+    made = {
+        "mesh": {
+            "nodes": [[1, 0, 0, 0], [2, 1, 0, 0], [3, 1, 1, 0], [4, 0, 1, 0], [101, 0.5, 0.5, 0]],
+            "segments": [[1, 1, 2, 3, 4]],
+        },
+        "node": [{"nodes": "all", "motion": "free", "mass": 1.0}],
+        "tie": [{"name": "tie", "slaves": [101]}],
+        "integrator": {"method": method, "time_step": 1e-3},
+    }
     fmu = Fmu(made, tmp_path)
     instance = Instance(fmu).start()
     assert set_derivatives(instance, ["slave[1].f[1]"], [1], [10.0]) == OK
@@ -251,14 +287,20 @@ def test_wrong_derivatives_of_inputs_change_nothing(fmu):
     instance, other = started(fmu), started(fmu)
     good = "slave[1].f[1]"
     for names, orders, values, words in (
-            ([good], [0], [1.0], "order 1 or 2, not 0"), ([good], [3], [1.0], "order 1 or 2, not 3"),
-            ([good, "slave[1].v[1]"], [1, 1], [1.0, 1.0], "'slave[1].v[1]' is not an input"),
-            ([good, "slave[1].mass"], [1, 1], [1.0, 1.0], "is not an input"),
-            ([good, good], [1, 2], [1.0, np.nan], good), ([good], [1], [np.inf], good)):
+        ([good], [0], [1.0], "order 1 or 2, not 0"),
+        ([good], [3], [1.0], "order 1 or 2, not 3"),
+        ([good, "slave[1].v[1]"], [1, 1], [1.0, 1.0], "'slave[1].v[1]' is not an input"),
+        ([good, "slave[1].mass"], [1, 1], [1.0, 1.0], "is not an input"),
+        ([good, good], [1, 2], [1.0, np.nan], good),
+        ([good], [1], [np.inf], good),
+    ):
         assert set_derivatives(instance, names, orders, values) == ERROR
         assert words in instance.errors()[-1]
-    for arguments in ((None, (c_int * 1)(1), (c_double * 1)(1)), ((c_uint * 1)(0), None, (c_double * 1)(1)),
-                      ((c_uint * 1)(0), (c_int * 1)(1), None)):
+    for arguments in (
+        (None, (c_int * 1)(1), (c_double * 1)(1)),
+        ((c_uint * 1)(0), None, (c_double * 1)(1)),
+        ((c_uint * 1)(0), (c_int * 1)(1), None),
+    ):
         assert instance.call("SetRealInputDerivatives", arguments[0], c_size_t(1), *arguments[1:]) == ERROR
         assert "null pointer" in instance.errors()[-1]
     for i in (instance, other):
@@ -269,11 +311,17 @@ def test_wrong_derivatives_of_inputs_change_nothing(fmu):
 
 # ----------------------------------------------------------------------------------------------------- rates of outputs
 
+
 def rates(instance, names, order=1):
     n = len(names)
     values = (c_double * n)(*[np.nan] * n)
-    status = instance.call("GetRealOutputDerivatives", (c_uint * n)(*[instance.fmu.reference[name] for name in names]),
-                           c_size_t(n), (c_int * n)(*[order] * n), values)
+    status = instance.call(
+        "GetRealOutputDerivatives",
+        (c_uint * n)(*[instance.fmu.reference[name] for name in names]),
+        c_size_t(n),
+        (c_int * n)(*[order] * n),
+        values,
+    )
     return status, np.array(values[:])
 
 
@@ -282,7 +330,7 @@ def test_rates_of_outputs_follow_the_motion(fmu):
     outputs = [name for name in fmu.names("output") if "time_step" not in name and name != "drift"]
     instance = started(fmu)
     inputs = [name for name in fmu.names("input") if name.split(".")[1][0] in "az"]
-    assert instance.set({name: 0.0 for name in inputs}) == OK  # so that driven velocities are known to stand still
+    assert instance.set(dict.fromkeys(inputs, 0.0)) == OK  # so that driven velocities are known to stand still
     before = instance.get(outputs)
     status, found = rates(instance, outputs)
     assert status == OK
@@ -308,8 +356,10 @@ def test_rates_of_a_spring_and_damper(method, tmp_path):
     made["initial"] = [{"nodes": [201], "v": [0.3, -0.2, 0.4]}]
     instance = Instance(Fmu(made, tmp_path)).start(values={f"master[{i}].v[1]": 0.7 for i in (1, 2, 3, 4)})
     assert instance.step(0, 0.003) == OK
-    v, v_s, x, x_s = (instance.get([f"{name}[{k}]" for k in (1, 2, 3)])
-                      for name in ("point[1].v", "slave[1].v", "point[1].r", "slave[1].r"))
+    v, v_s, x, x_s = (
+        instance.get([f"{name}[{k}]" for k in (1, 2, 3)])
+        for name in ("point[1].v", "slave[1].v", "point[1].r", "slave[1].r")
+    )
     a = -4000.0 * (x - x_s - [0, 0, 0.7]) - 30.0 * (v - v_s)
     names = [f"master[{i}].f[{k}]" for i in (1, 2, 3, 4) for k in (1, 2, 3)] + [f"point[1].v[{k}]" for k in (1, 2, 3)]
     status, found = rates(instance, names)
@@ -321,8 +371,10 @@ def test_rates_of_a_spring_and_damper(method, tmp_path):
 
 
 def test_rates_of_driven_velocities_are_the_accelerations_given(tmp_path):
-    fmu = Fmu(scene(np.random.default_rng(14), "default", False, "driven", "consistent", "full", "finite",
-                    "integrated"), tmp_path)
+    fmu = Fmu(
+        scene(np.random.default_rng(14), "default", False, "driven", "consistent", "full", "finite", "integrated"),
+        tmp_path,
+    )
     rng = np.random.default_rng(15)
     instance = Instance(fmu).start(values=random_values(fmu, rng, fmu.names("input")))
     names = [f"slave[{j}].{what}[{k}]" for j in (1, 2) for what in "va" for k in (1, 2, 3)]
@@ -335,12 +387,18 @@ def test_rates_of_driven_velocities_are_the_accelerations_given(tmp_path):
 
 def test_wrong_rates_of_outputs(fmu):
     instance = started(fmu)
-    for names, order, words in ((["slave[1].v[1]"], 0, "order 1, not 0"), (["slave[1].v[1]"], 2, "order 1, not 2"),
-                                (["slave[1].f[1]"], 1, "is not an output")):
+    for names, order, words in (
+        (["slave[1].v[1]"], 0, "order 1, not 0"),
+        (["slave[1].v[1]"], 2, "order 1, not 2"),
+        (["slave[1].f[1]"], 1, "is not an output"),
+    ):
         status, values = rates(instance, names, order)
         assert status == ERROR and np.isnan(values).all() and words in instance.errors()[-1]
-    for arguments in ((None, (c_int * 1)(1), (c_double * 1)(1)), ((c_uint * 1)(0), None, (c_double * 1)(1)),
-                      ((c_uint * 1)(0), (c_int * 1)(1), None)):
+    for arguments in (
+        (None, (c_int * 1)(1), (c_double * 1)(1)),
+        ((c_uint * 1)(0), None, (c_double * 1)(1)),
+        ((c_uint * 1)(0), (c_int * 1)(1), None),
+    ):
         assert instance.call("GetRealOutputDerivatives", arguments[0], c_size_t(1), *arguments[1:]) == ERROR
     assert rates(instance, [])[0] == OK
     assert instance.step(0.01, 0.01) == OK

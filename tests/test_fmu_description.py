@@ -8,12 +8,12 @@ from pathlib import Path
 import fmpy
 import numpy as np
 import pytest
-from fmpy.validation import validate_fmu
-from lxml import etree
-
 import tiefmu
+from fmpy.validation import validate_fmu
 from fmu_calls import OK, Fmu, Instance
-from fmu_scenes import SETTINGS, scene as many_sided
+from fmu_scenes import SETTINGS
+from fmu_scenes import scene as many_sided
+from lxml import etree
 
 SCENES = sorted((Path(__file__).parents[1] / "scenes").glob("*.toml"))
 
@@ -22,13 +22,28 @@ def quad(motion="driven", rotations=True, formulation="default", slaves=1, offse
     """Nodes 11..14 with slaves 101.. over them."""
     places = [(i + 0.5) / slaves for i in range(slaves)]
     return {
-        "mesh": {"nodes": [[11, 0, 0, 0], [12, 0.1, 0, 0], [13, 0.1, 0.1, 0], [14, 0, 0.1, 0],
-                           *([101 + j, 0.1 * s, 0.06, offset] for j, s in enumerate(places))],
-                 "segments": [[1, 11, 12, 13, 14]]},
-        "node": [{"nodes": "all", "motion": motion, "rotations": rotations, "mass": 0.5,
-                  "inertia": 0.001 if rotations else 0.0}],
-        "tie": [{"name": "tie", "segments": "all", "slaves": [101 + j for j in range(slaves)],
-                 "formulation": formulation}],
+        "mesh": {
+            "nodes": [
+                [11, 0, 0, 0],
+                [12, 0.1, 0, 0],
+                [13, 0.1, 0.1, 0],
+                [14, 0, 0.1, 0],
+                *([101 + j, 0.1 * s, 0.06, offset] for j, s in enumerate(places)),
+            ],
+            "segments": [[1, 11, 12, 13, 14]],
+        },
+        "node": [
+            {
+                "nodes": "all",
+                "motion": motion,
+                "rotations": rotations,
+                "mass": 0.5,
+                "inertia": 0.001 if rotations else 0.0,
+            }
+        ],
+        "tie": [
+            {"name": "tie", "segments": "all", "slaves": [101 + j for j in range(slaves)], "formulation": formulation}
+        ],
         **tables,
     }
 
@@ -43,13 +58,27 @@ def table_of(scene, tmp_path) -> dict[str, str]:
 
 # ----------------------------------------------------------------------------------------------- what the table lists
 
-OF_DRIVEN = {"master[{}].v": "input", "master[{}].w": "input", "master[{}].f": "output", "master[{}].t": "output",
-             "master[{}].added_mass": "calculatedParameter", "master[{}].added_inertia": "calculatedParameter"}
-OF_FREE = OF_DRIVEN | {"master[{}].v": "output", "master[{}].w": "output", "master[{}].f_ext": "input",
-                       "master[{}].t_ext": "input"}
+OF_DRIVEN = {
+    "master[{}].v": "input",
+    "master[{}].w": "input",
+    "master[{}].f": "output",
+    "master[{}].t": "output",
+    "master[{}].added_mass": "calculatedParameter",
+    "master[{}].added_inertia": "calculatedParameter",
+}
+OF_FREE = OF_DRIVEN | {
+    "master[{}].v": "output",
+    "master[{}].w": "output",
+    "master[{}].f_ext": "input",
+    "master[{}].t_ext": "input",
+}
 OF_SLAVE = {"slave[1].f": "input", "slave[1].t": "input", "slave[1].v": "output", "slave[1].w": "output"}
-OF_FREE_SCENE = {"stable_time_step": "output", "nodal_time_step": "output", "integrator.time_step": "parameter",
-                 "integrator.safety": "parameter"}
+OF_FREE_SCENE = {
+    "stable_time_step": "output",
+    "nodal_time_step": "output",
+    "integrator.time_step": "parameter",
+    "integrator.safety": "parameter",
+}
 
 
 def each(table, numbers=(1, 2, 3, 4)):
@@ -70,12 +99,14 @@ def test_free_masters_with_rotations(tmp_path):
 
 def test_translations_only(tmp_path):
     assert table_of(quad(rotations=False), tmp_path) == (
-        each(without(OF_DRIVEN, "w", "t", "added_inertia")) | without(OF_SLAVE, "t", "w"))
+        each(without(OF_DRIVEN, "w", "t", "added_inertia")) | without(OF_SLAVE, "t", "w")
+    )
 
 
 def test_optimized_needs_no_rotations(tmp_path):
     assert table_of(quad(rotations=False, formulation="optimized"), tmp_path) == (
-        each(without(OF_DRIVEN, "w", "t", "added_inertia")) | OF_SLAVE)
+        each(without(OF_DRIVEN, "w", "t", "added_inertia")) | OF_SLAVE
+    )
 
 
 def test_optimized_gives_no_moment_to_rotating_masters(tmp_path):
@@ -92,7 +123,8 @@ def test_accelerations_are_inputs_of_driven_masters(tmp_path, inertia, reaction)
 def test_positions_are_inputs_of_driven_masters(tmp_path):
     scene = quad(model={"position": "input"}, interface={"expose": ["master.r", "slave.r"]})
     assert table_of(scene, tmp_path) == (
-        each(OF_DRIVEN | {"master[{}].r": "input"}) | OF_SLAVE | {"slave[1].r": "output"})
+        each(OF_DRIVEN | {"master[{}].r": "input"}) | OF_SLAVE | {"slave[1].r": "output"}
+    )
 
 
 def test_fixed_masters_have_reactions_only(tmp_path):
@@ -103,13 +135,29 @@ def test_fixed_masters_have_reactions_only(tmp_path):
 
 
 def test_points(tmp_path):
-    scene = quad(spring=[{"nodes": [101, 5], "stiffness": 1e3}, {"nodes": [101, 201], "stiffness": 1e3},
-                         {"nodes": [101, 202], "stiffness": 1e3}], interface={"expose": ["point.r"]})
+    scene = quad(
+        spring=[
+            {"nodes": [101, 5], "stiffness": 1e3},
+            {"nodes": [101, 201], "stiffness": 1e3},
+            {"nodes": [101, 202], "stiffness": 1e3},
+        ],
+        interface={"expose": ["point.r"]},
+    )
     scene["mesh"]["nodes"] += [[5, 0, 0, 1], [201, 0, 1, 1], [202, 1, 1, 1]]
-    scene["node"] += [{"nodes": [5], "motion": "free", "rotations": True, "mass": 1.0, "inertia": 0.1},
-                      {"nodes": [202], "motion": "fixed"}, {"nodes": [201], "rotations": False}]
-    points = {"point[1].v": "output", "point[1].w": "output", "point[1].r": "output", "point[1].f_ext": "input",
-              "point[1].t_ext": "input", "point[2].v": "input", "point[2].r": "output"}
+    scene["node"] += [
+        {"nodes": [5], "motion": "free", "rotations": True, "mass": 1.0, "inertia": 0.1},
+        {"nodes": [202], "motion": "fixed"},
+        {"nodes": [201], "rotations": False},
+    ]
+    points = {
+        "point[1].v": "output",
+        "point[1].w": "output",
+        "point[1].r": "output",
+        "point[1].f_ext": "input",
+        "point[1].t_ext": "input",
+        "point[2].v": "input",
+        "point[2].r": "output",
+    }
     assert table_of(scene, tmp_path) == each(OF_DRIVEN) | OF_SLAVE | points | OF_FREE_SCENE
 
 
@@ -126,14 +174,34 @@ def test_moments_only_where_a_tie_gives_them(tmp_path):
 
 
 def test_everything_exposed(tmp_path):
-    names = ["slave.r", "slave.a", "master.r", "energy", "power_residual", "drift", "master.stiffness", "slave.mass",
-             "slave.inertia"]
+    names = [
+        "slave.r",
+        "slave.a",
+        "master.r",
+        "energy",
+        "power_residual",
+        "drift",
+        "master.stiffness",
+        "slave.mass",
+        "slave.inertia",
+    ]
     scene = quad(motion="free", interface={"expose": names})
     extra = {f"energy.{kind}": "output" for kind in ("kinetic", "strain", "dissipated", "external", "residual")}
-    extra |= {"power_residual": "output", "drift": "output", "slave[1].r": "output", "slave[1].a": "output",
-              "slave[1].mass": "parameter", "slave[1].inertia": "parameter"}
-    extra |= each({"master[{}].r": "output", "master[{}].stiffness": "calculatedParameter",
-                   "master[{}].rotational_stiffness": "calculatedParameter"})
+    extra |= {
+        "power_residual": "output",
+        "drift": "output",
+        "slave[1].r": "output",
+        "slave[1].a": "output",
+        "slave[1].mass": "parameter",
+        "slave[1].inertia": "parameter",
+    }
+    extra |= each(
+        {
+            "master[{}].r": "output",
+            "master[{}].stiffness": "calculatedParameter",
+            "master[{}].rotational_stiffness": "calculatedParameter",
+        }
+    )
     assert table_of(scene, tmp_path) == each(OF_FREE) | OF_SLAVE | OF_FREE_SCENE | extra
 
 
@@ -161,6 +229,7 @@ def test_numbers_ascend_with_node_ids_and_descriptions_name_them(tmp_path):
 
 
 # ---------------------------------------------------------------------------------------------- importers can read it
+
 
 @pytest.mark.parametrize("path", SCENES, ids=lambda p: p.stem)
 def test_example_scenes_are_valid(tmp_path, path):
@@ -199,15 +268,19 @@ def test_names_are_flat_where_there_are_many(tmp_path):
 def test_starts_read_back_to_the_same_double(tmp_path):
     rng = np.random.default_rng(5)
     scene = quad(motion="free", model={"position": "input"}, interface={"expose": ["slave.mass", "slave.inertia"]})
-    scene["mesh"]["nodes"] = [[row[0], *(np.array(row[1:]) + 0.01 * rng.normal(size=3)).tolist()]
-                              for row in scene["mesh"]["nodes"]]
+    scene["mesh"]["nodes"] = [
+        [row[0], *(np.array(row[1:]) + 0.01 * rng.normal(size=3)).tolist()] for row in scene["mesh"]["nodes"]
+    ]
     scene["node"] += [{"nodes": [11, 12], "motion": "driven"}, {"nodes": [101], "mass": 1 / 3, "inertia": 0.1 / 7}]
     scene["initial"] = [{"nodes": [11], "v": rng.normal(size=3).tolist(), "w": [1e-300, -1 / 3, 12345678.9]}]
     scene["integrator"] = {"safety": 0.7}
     fmu = Fmu(scene, tmp_path)
     started = [v for v in fmu.description.modelVariables if v.start is not None]
-    assert {v.causality for v in started} == {"input", "parameter"} == {
-        v.causality for v in fmu.description.modelVariables if v.initial == "exact"}
+    assert (
+        {v.causality for v in started}
+        == {"input", "parameter"}
+        == {v.causality for v in fmu.description.modelVariables if v.initial == "exact"}
+    )
     instance = Instance(fmu)
     assert instance.call("EnterInitializationMode") == OK
     values = instance.get([v.name for v in started])
@@ -222,11 +295,16 @@ def test_starts_read_back_to_the_same_double(tmp_path):
 def test_outputs_and_initial_unknowns_are_complete_and_ordered(tmp_path):
     fmu = Fmu(quad(motion="free", interface={"expose": ["energy", "master.stiffness"]}), tmp_path)
     place = {v.name: k for k, v in enumerate(fmu.description.modelVariables)}
-    for unknowns, causalities in ((fmu.description.outputs, {"output"}),
-                                  (fmu.description.initialUnknowns, {"output", "calculatedParameter"})):
+    for unknowns, causalities in (
+        (fmu.description.outputs, {"output"}),
+        (fmu.description.initialUnknowns, {"output", "calculatedParameter"}),
+    ):
         listed = [place[u.variable.name] for u in unknowns]
-        assert listed == sorted(listed) == [place[v.name] for v in fmu.description.modelVariables
-                                            if v.causality in causalities]
+        assert (
+            listed
+            == sorted(listed)
+            == [place[v.name] for v in fmu.description.modelVariables if v.causality in causalities]
+        )
         for u in unknowns:
             if u.dependencies is not None:
                 known = [place[v.name] for v in u.dependencies]
@@ -242,9 +320,11 @@ def test_a_row_of_thousands_of_dependencies_is_left_out(tmp_path):
 
 def test_a_long_row_of_nearly_all_inputs_is_left_out(tmp_path):
     """Every slave's load reaches every master of the only segment."""
+
     def rows(slaves):
         outputs = Fmu(quad(slaves=slaves, rotations=False, formulation="optimized"), tmp_path).description.outputs
         return [row.dependencies for row in outputs if row.variable.name.startswith("master")]
+
     assert [len(row) for row in rows(160)] == 12 * [960]  # of 972
     assert rows(170) == 12 * [None]
 
@@ -253,6 +333,7 @@ def test_kinds_are_left_out_where_all_are_dependent(tmp_path):
     def kinds(**model):
         scene = quad(rotations=False, formulation="optimized", model=model)
         return [row.dependenciesKind for row in Fmu(scene, tmp_path).description.outputs if row.dependencies]
+
     assert kinds() and not any(kinds())
     assert all(kinds(geometry="small"))
 
@@ -287,7 +368,7 @@ def test_only_what_is_built_is_promised(tmp_path):
 
 def test_titles_and_names_are_escaped(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    title = 'Tür & <tie> "a" \'b\' %s\tend'
+    title = "Tür & <tie> \"a\" 'b' %s\tend"
     quoted = title.replace('"', '\\"').replace("\t", "\\t")
     Path("2 <weld> & 'tür'.toml").write_text(f'title = "{quoted}"\n{TOML}', encoding="utf-8")
     scene = tiefmu.load("2 <weld> & 'tür'.toml")
@@ -315,6 +396,7 @@ slaves = [101]
 
 # ------------------------------------------------------------------------------------------------------------- GUID
 
+
 def guid(scene) -> str:
     xml = tiefmu.package.contents(tiefmu.load(scene))["modelDescription.xml"]
     return etree.fromstring(xml).get("guid")
@@ -328,21 +410,24 @@ def test_guid_changes_with_everything_that_matters():
         change(scene)
         return guid(scene)
 
-    guids = [guid(base)] + [changed(change) for change in (
-        lambda s: s.update(title="Other"),
-        lambda s: s["mesh"]["nodes"][0].__setitem__(1, 1e-17),
-        lambda s: s["node"][0].update(mass=0.5000000000000001),
-        lambda s: s["node"][0].update(stiffness=1.0),
-        lambda s: s["tie"][0].update(formulation="optimized"),
-        lambda s: s["spring"][0].update(damping=1.0),
-        lambda s: s.update(model={"gravity": [0, 0, -9.81]}),
-        lambda s: s.update(model={"inertia": "consistent"}),
-        lambda s: s.update(model={"geometry": "small"}),
-        lambda s: s.update(integrator={"method": "rk4"}),
-        lambda s: s.update(integrator={"safety": 0.8}),
-        lambda s: s.update(interface={"expose": ["drift"]}),
-        lambda s: s.update(initial=[{"nodes": [12], "v": [0, 0, 1e-9]}]),
-    )]
+    guids = [guid(base)] + [
+        changed(change)
+        for change in (
+            lambda s: s.update(title="Other"),
+            lambda s: s["mesh"]["nodes"][0].__setitem__(1, 1e-17),
+            lambda s: s["node"][0].update(mass=0.5000000000000001),
+            lambda s: s["node"][0].update(stiffness=1.0),
+            lambda s: s["tie"][0].update(formulation="optimized"),
+            lambda s: s["spring"][0].update(damping=1.0),
+            lambda s: s.update(model={"gravity": [0, 0, -9.81]}),
+            lambda s: s.update(model={"inertia": "consistent"}),
+            lambda s: s.update(model={"geometry": "small"}),
+            lambda s: s.update(integrator={"method": "rk4"}),
+            lambda s: s.update(integrator={"safety": 0.8}),
+            lambda s: s.update(interface={"expose": ["drift"]}),
+            lambda s: s.update(initial=[{"nodes": [12], "v": [0, 0, 1e-9]}]),
+        )
+    ]
     assert len(set(guids)) == len(guids)
     assert guid(base) == guids[0]
     assert re.fullmatch(r"\{[0-9a-f]{8}(-[0-9a-f]{4}){3}-[0-9a-f]{12}\}", guids[0])

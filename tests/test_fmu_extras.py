@@ -11,10 +11,9 @@ from pathlib import Path
 import fmpy
 import numpy as np
 import pytest
-from lxml import etree
-
 import tiefmu
 from fmu_calls import OK, Fmu, Instance
+from lxml import etree
 
 SCENES = sorted((Path(__file__).parents[1] / "scenes").glob("*.toml"))
 VOID = {"meta", "img", "br"}
@@ -62,7 +61,8 @@ def test_the_page_shows_the_scene(files):
     for row in report["ties"]:
         assert row["name"] in page.text and row["formulation"] in page.text
     assert text.count("<svg") == 1 and text.count('<path d="M') == len(report["slaves"]) + len(
-        {row["segment"] for row in report["slaves"]})
+        {row["segment"] for row in report["slaves"]}
+    )
     for row in report["slaves"][:200]:
         assert f"<td>{row['number']}</td><td>{row['id']}</td>" in text
     assert "slave[j].f" in page.text and "master[i].f" in page.text and "inertial frame" in page.text
@@ -71,7 +71,7 @@ def test_the_page_shows_the_scene(files):
 
 
 def test_a_title_cannot_break_the_page(weld, tmp_path):
-    weld["title"] = "<b>A & \"B\"</b> ü"
+    weld["title"] = '<b>A & "B"</b> ü'
     weld["tie"][0]["name"] = "<i>"
     with zipfile.ZipFile(tiefmu.build(tiefmu.load(weld), tmp_path / "a.fmu")) as archive:
         page = Balanced(archive.read("documentation/index.html").decode())
@@ -80,6 +80,7 @@ def test_a_title_cannot_break_the_page(weld, tmp_path):
 
 def test_the_picture_is_a_png_of_the_scene(files):
     from matplotlib import image  # an independent reader
+
     _, _, found = files
     pixels = image.imread(io.BytesIO(found["model.png"]), format="png")
     assert pixels.shape == (360, 480, 3)
@@ -88,7 +89,7 @@ def test_the_picture_is_a_png_of_the_scene(files):
     rows, columns = np.flatnonzero(dark.any(axis=1)), np.flatnonzero(dark.any(axis=0))
     assert columns[-1] - columns[0] > 400 or rows[-1] - rows[0] > 280  # fills the frame
     assert min(rows[0], 359 - rows[-1], columns[0], 479 - columns[-1]) > 10  # and stays inside
-    red = (pixels[..., 0] > pixels[..., 2] + 0.3)
+    red = pixels[..., 0] > pixels[..., 2] + 0.3
     assert red.sum() > 20  # slaves
 
 
@@ -107,8 +108,10 @@ def test_one_terminal_for_each_master_and_slave(files):
         match = re.fullmatch(r"((?:master|slave)\[\d+\])\.(.+)", variable.name)
         if match:
             expected.setdefault(match[1], {})[match[2]] = variable.name
-    terminals = {terminal.get("name"): {m.get("memberName"): m.get("variableName") for m in terminal}
-                 for terminal in root.iter("Terminal")}
+    terminals = {
+        terminal.get("name"): {m.get("memberName"): m.get("variableName") for m in terminal}
+        for terminal in root.iter("Terminal")
+    }
     assert terminals == expected and len(terminals) == len(root.findall("Terminals/Terminal"))
     described = {variable.name: variable.description for variable in description.modelVariables}
     for terminal in root.iter("Terminal"):
@@ -130,12 +133,16 @@ def table(data: bytes) -> np.ndarray:
     return np.genfromtxt(io.BytesIO(data), delimiter=",", names=True, deletechars="", replace_space=" ")
 
 
-@pytest.mark.parametrize("path", [p for p in SCENES if p.stem in ("spotweld", "rivet", "heavy_slave_split", "spinning")],
-                         ids=lambda path: path.stem)
+@pytest.mark.parametrize(
+    "path",
+    [p for p in SCENES if p.stem in ("spotweld", "rivet", "heavy_slave_split", "spinning")],
+    ids=lambda path: path.stem,
+)
 def test_reference_results_are_what_the_fmu_answers(path, tmp_path):
     fmu = Fmu(path, tmp_path)
-    inputs, outputs = (table((fmu.folder / "extra" / "tiefmu" / f"reference_{what}.csv").read_bytes())
-                       for what in ("in", "out"))
+    inputs, outputs = (
+        table((fmu.folder / "extra" / "tiefmu" / f"reference_{what}.csv").read_bytes()) for what in ("in", "out")
+    )
     assert set(inputs.dtype.names[1:]) == set(fmu.names("input"))
     assert set(outputs.dtype.names[1:]) == set(fmu.names("output"))
     values = [dict(zip(inputs.dtype.names[1:], row.tolist()[1:])) for row in inputs]
@@ -157,8 +164,10 @@ def test_large_scenes_have_no_reference_results(files):
 
 
 def test_a_build_imports_nothing_slow(weld, scene_file):
-    code = ("import sys, tiefmu; tiefmu.build(tiefmu.load(sys.argv[1]), 'a.fmu'); "
-            "print([m for m in ('matplotlib', 'fmpy', 'tqdm') if m in sys.modules])")
+    code = (
+        "import sys, tiefmu; tiefmu.build(tiefmu.load(sys.argv[1]), 'a.fmu'); "
+        "print([m for m in ('matplotlib', 'fmpy', 'tqdm') if m in sys.modules])"
+    )
     done = subprocess.run([sys.executable, "-c", code, scene_file(weld)], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
 

@@ -5,12 +5,11 @@ from ctypes import byref, c_char_p, c_size_t, c_void_p
 import fmpy
 import numpy as np
 import pytest
-
 from fmu_calls import ERROR, OK, Fmu, Instance
 from fmu_scenes import any_fmu, fmu, random_values  # noqa: F401 (fixtures)
 
-
 # ----------------------------------------------------------------------------------- saved states, instances and reset
+
 
 def run(instances, fmu, rng, steps=40, time=0.0):
     """The same irregular run in every instance, step by step; the last outputs and the time."""
@@ -124,11 +123,13 @@ def test_many_instances_in_any_order_of_death(fmu):
 
 # ------------------------------------------------------------------------------------------------------------ messages
 
+
 def test_messages_are_arguments_and_reach_their_owner(fmu):
     instance = Instance(fmu, name="a %s%n%d", environment=0x1234)
     assert instance.call("Terminate") == ERROR
-    assert instance.log == [(0x1234, "a %s%n%d", ERROR, "logStatusError", "%s",
-                             "fmi2Terminate: not allowed in state instantiated")]
+    assert instance.log == [
+        (0x1234, "a %s%n%d", ERROR, "logStatusError", "%s", "fmi2Terminate: not allowed in state instantiated")
+    ]
     instance.free()
 
 
@@ -161,8 +162,13 @@ def test_categories_choose_what_is_logged(fmu):
 
 
 def test_findings_about_the_tie_are_logged(tmp_path):
-    scene = {"mesh": {"nodes": [[1, 0, 0, 0], [2, 1, 0, 0], [3, 1, 1, 0], [4, 0, 1, 0], [101, 0.3, 0.6, 0.4]],
-                      "segments": [[1, 1, 2, 3, 4]]}, "tie": [{"name": "tie", "slaves": [101]}]}
+    scene = {
+        "mesh": {
+            "nodes": [[1, 0, 0, 0], [2, 1, 0, 0], [3, 1, 1, 0], [4, 0, 1, 0], [101, 0.3, 0.6, 0.4]],
+            "segments": [[1, 1, 2, 3, 4]],
+        },
+        "tie": [{"name": "tie", "slaves": [101]}],
+    }
     instance = Instance(Fmu(scene, tmp_path), logging=True).start()
     messages = [message for message in instance.log if message[3] == "logTie"]
     assert any("slave 101" in message[5] or "offset" in message[5] for message in messages)
@@ -182,6 +188,7 @@ def test_unknown_categories_are_refused(fmu):
 
 # ---------------------------------------------------------------------------------------------------------------- FMPy
 
+
 @pytest.mark.parametrize("irregular", [False, True])
 def test_fmpy_simulates_it_as_the_calls_do(any_fmu, irregular):
     rng = np.random.default_rng(20)
@@ -195,8 +202,11 @@ def test_fmpy_simulates_it_as_the_calls_do(any_fmu, irregular):
         rows.append(instance.get(names))
     if irregular:
         result = []
-        slave = fmpy.fmi2.FMU2Slave(guid=any_fmu.description.guid, unzipDirectory=str(any_fmu.folder),
-                                    modelIdentifier=any_fmu.description.coSimulation.modelIdentifier)
+        slave = fmpy.fmi2.FMU2Slave(
+            guid=any_fmu.description.guid,
+            unzipDirectory=str(any_fmu.folder),
+            modelIdentifier=any_fmu.description.coSimulation.modelIdentifier,
+        )
         slave.instantiate()
         slave.setupExperiment(startTime=0.0)
         slave.setReal([any_fmu.reference[name] for name in start], list(start.values()))
@@ -210,8 +220,9 @@ def test_fmpy_simulates_it_as_the_calls_do(any_fmu, irregular):
         slave.terminate()
         slave.fmi2FreeInstance(slave.component)
     else:
-        table = fmpy.simulate_fmu(str(any_fmu.path), start_values=start, output=names, stop_time=0.2,
-                                  output_interval=5e-3)
+        table = fmpy.simulate_fmu(
+            str(any_fmu.path), start_values=start, output=names, stop_time=0.2, output_interval=5e-3
+        )
         np.testing.assert_allclose(table["time"], times, rtol=1e-12)
         result = [[row[name] for name in names] for row in table]
     np.testing.assert_allclose(result, rows, rtol=0 if irregular else 1e-9, atol=0 if irregular else 1e-9)

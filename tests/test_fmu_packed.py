@@ -9,7 +9,6 @@ from pathlib import Path
 import fmpy
 import numpy as np
 import pytest
-
 import tiefmu
 from fmu_calls import ERROR, OK, Fmu, Instance
 from fmu_scenes import fmu  # noqa: F401
@@ -33,8 +32,16 @@ def test_missing_folder(fmu, tmp_path):  # noqa: F811
     assert refused(fmu, tmp_path / "nowhere") == f"fmi2Instantiate: cannot read '{tmp_path / 'nowhere' / 'scene.bin'}'"
 
 
-@pytest.mark.parametrize("length, why", [(0, "not a scene of tiefmu"), (12, "not a scene of tiefmu"),
-                                         (13, "cut short"), (30, "cut short"), (-1, " bytes instead of ")])
+@pytest.mark.parametrize(
+    "length, why",
+    [
+        (0, "not a scene of tiefmu"),
+        (12, "not a scene of tiefmu"),
+        (13, "cut short"),
+        (30, "cut short"),
+        (-1, " bytes instead of "),
+    ],
+)
 def test_truncated_resource(fmu, resources, length, why):  # noqa: F811
     data = (resources / "scene.bin").read_bytes()
     (resources / "scene.bin").write_bytes(data[:length])
@@ -93,8 +100,12 @@ for path in [fmu.folder, *fmu.folder.rglob("*")]:
 
 @pytest.mark.parametrize("where", ["deleted", "read-only"])
 def test_current_folder_deleted_or_nothing_to_write_to(fmu, where, tmp_path):  # noqa: F811
-    done = subprocess.run([sys.executable, "-c", RUN, str(Path(__file__).parent), str(fmu.path), where], cwd=tmp_path,
-                          capture_output=True, text=True)
+    done = subprocess.run(
+        [sys.executable, "-c", RUN, str(Path(__file__).parent), str(fmu.path), where],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+    )
     assert done.returncode == 0, done.stderr
     instance = Instance(fmu).start()
     assert instance.step(0, 0.01) == OK
@@ -109,6 +120,7 @@ def test_names_of_folders(weld, name, tmp_path):
     folder.mkdir()
     path = tiefmu.build(tiefmu.load(weld), folder / f"{name}.fmu")
     unpacked = fmpy.extract(str(path), unzipdir=str(folder / "unpacked"))
-    result = fmpy.simulate_fmu(unpacked, stop_time=0.01, output_interval=0.005, start_values={"master[1].v[3]": 1.0},
-                               output=["slave[1].v[3]"])
+    result = fmpy.simulate_fmu(
+        unpacked, stop_time=0.01, output_interval=0.005, start_values={"master[1].v[3]": 1.0}, output=["slave[1].v[3]"]
+    )
     assert (result["slave[1].v[3]"] > 0.1).all() and np.isfinite(result["slave[1].v[3]"]).all()

@@ -6,13 +6,12 @@ from ctypes import byref, c_double, c_size_t, c_void_p, create_string_buffer
 import fmpy
 import numpy as np
 import pytest
-from fmpy.validation import validate_fmu
-from lxml import etree
-
 import tiefmu
 from differences import check_derivatives
+from fmpy.validation import validate_fmu
 from fmu_calls import OK, Fmu, Instance
 from fmu_scenes import random_values
+from lxml import etree
 from port_scenes import PORTS, ported
 from test_fmu_dependencies import compare, declared, hash_of, observed
 from test_fmu_derivatives import rates
@@ -30,9 +29,11 @@ CASES = [  # formulation, rotations, inertia, reaction, geometry; motion of the 
     (("optimized", True, "lumped", "full", "small"), "mixed"),
 ]
 IDS = ["-".join(map(str, (*settings, motions))) for settings, motions in CASES]
-PARTS = [{"name": "left", "nodes": [1, 2]},
-         {"name": "right", "nodes": [3, 4, 5, 7, 9], "at": [0.1, 0.2, 0.3]},
-         {"name": "load", "nodes": [101, 102, 103, 104]}]
+PARTS = [
+    {"name": "left", "nodes": [1, 2]},
+    {"name": "right", "nodes": [3, 4, 5, 7, 9], "at": [0.1, 0.2, 0.3]},
+    {"name": "load", "nodes": [101, 102, 103, 104]},
+]
 TOLERANCE = 3e-8  # of derivatives by differences: the sum of many slaves' power is their rounding
 WHOLE = [{"name": "base", "nodes": list(range(1, 11))}, {"name": "load", "nodes": [101, 102, 103, 104, 105]}]
 
@@ -94,8 +95,9 @@ def started(fmu, seed=23) -> Instance:
 def test_the_description_is_valid(fmu):
     """Also names: those of ports are no structured ones."""
     assert not validate_fmu(str(fmu.path))
-    description = fmpy.read_model_description(str(fmu.path), validate=True, validate_variable_names=True,
-                                              validate_model_structure=True)
+    description = fmpy.read_model_description(
+        str(fmu.path), validate=True, validate_variable_names=True, validate_model_structure=True
+    )
     assert description.variableNamingConvention == "flat"
     members = {name for name in fmu.variables if re.match(r"(master\[[1-6]\]|slave\[[1245]\]|point\[1\])\.", name)}
     assert not members
@@ -180,10 +182,23 @@ def test_a_port_that_leaves_the_world(name, tmp_path):
 
 
 def test_slaves_of_a_port_that_come_to_lie_on_a_line(tmp_path):
-    made = {"mesh": {"nodes": [[1, 0, 0, 0], [2, 1, 0, 0], [3, 1, 1, 0], [4, 0, 1, 0], [101, 0.2, 0.5, 0],
-                               [102, 0.8, 0.5, 0], [103, 0.5, 0.8, 0]], "segments": [[1, 1, 2, 3, 4]]},
-            "node": [{"nodes": "all"}], "tie": [{"name": "tie", "slaves": [101, 102, 103]}],
-            "interface": {"ports": [{"name": "load", "nodes": [101, 102, 103]}]}}
+    made = {
+        "mesh": {
+            "nodes": [
+                [1, 0, 0, 0],
+                [2, 1, 0, 0],
+                [3, 1, 1, 0],
+                [4, 0, 1, 0],
+                [101, 0.2, 0.5, 0],
+                [102, 0.8, 0.5, 0],
+                [103, 0.5, 0.8, 0],
+            ],
+            "segments": [[1, 1, 2, 3, 4]],
+        },
+        "node": [{"nodes": "all"}],
+        "tie": [{"name": "tie", "slaves": [101, 102, 103]}],
+        "interface": {"ports": [{"name": "load", "nodes": [101, 102, 103]}]},
+    }
     instance = Instance(Fmu(made, tmp_path)).start()
     for i, y in ((3, -0.5), (4, -0.5), (1, 0.5), (2, 0.5)):  # all to y = 0.5
         assert instance.set({f"master[{i}].v[2]": y}) == OK
@@ -202,8 +217,13 @@ def test_terminals_page_and_reference_results(fmu):
         expected = {name.split(".", 1)[1]: name for name in fmu.variables if name.startswith(f"port[{port}].")}
         assert terminals[f"port[{port}]"] == expected and len(expected) > 12
     page = Balanced((fmu.folder / "documentation" / "index.html").read_text())
-    for words in ("Ports: nodes that the interface shows as one rigid body", "base", "6 driven nodes", "3 slaves",
-                  "port[name]"):
+    for words in (
+        "Ports: nodes that the interface shows as one rigid body",
+        "base",
+        "6 driven nodes",
+        "3 slaves",
+        "port[name]",
+    ):
         assert words in page.text
     header = (fmu.folder / "extra" / "tiefmu" / "reference_in.csv").read_text().splitlines()[0].split(",")
     assert set(header[1:]) == set(fmu.names("input"))
@@ -252,8 +272,10 @@ def test_two_builds_are_the_same_and_a_name_changes_the_guid(tmp_path):
     moved = case_scene((("optimized", False, "lumped", "loads", "finite"), "driven"))
     moved["interface"]["ports"][0]["at"] = [0.3, -0.2, 0.5]
     assert PORTS[0]["at"] == [0.3, -0.2, 0.4]
-    guids = {fmpy.read_model_description(str(tiefmu.build(tiefmu.load(scene), tmp_path / f"{k}.fmu"))).guid
-             for k, scene in enumerate((made, moved))}
+    guids = {
+        fmpy.read_model_description(str(tiefmu.build(tiefmu.load(scene), tmp_path / f"{k}.fmu"))).guid
+        for k, scene in enumerate((made, moved))
+    }
     assert len(guids) == 2
 
 
@@ -261,5 +283,7 @@ def test_two_builds_are_the_same_and_a_name_changes_the_guid(tmp_path):
 def test_advice_and_studies_say_that_they_take_no_ports(command, scene_file, capsys):
     scene_file(case_scene((("default", True, "lumped", "loads", "finite"), "driven")))
     assert main(command) == 2
-    assert capsys.readouterr().err == ("error: weld.toml: interface: ports: advice and studies move and load the nodes one "
-                                       "by one; leave the ports out of the scene they look at\n")
+    assert capsys.readouterr().err == (
+        "error: weld.toml: interface: ports: advice and studies move and load the nodes one "
+        "by one; leave the ports out of the scene they look at\n"
+    )

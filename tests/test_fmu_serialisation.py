@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
 from fmu_calls import ERROR, OK, Fmu, Instance, set_derivatives
 from fmu_scenes import MIXED, any_fmu, random_values, scene  # noqa: F401
 
@@ -110,8 +109,9 @@ def test_every_stage_comes_back(any_fmu, stage):  # noqa: F811
                 assert instance.call("ExitInitializationMode") == OK
         names = list(any_fmu.reference)
         np.testing.assert_array_equal(one.get(names), other.get(names))
-        np.testing.assert_array_equal(run(one, 2.0, 2, np.random.default_rng(6)),
-                                      run(other, 2.0, 2, np.random.default_rng(6)))
+        np.testing.assert_array_equal(
+            run(one, 2.0, 2, np.random.default_rng(6)), run(other, 2.0, 2, np.random.default_rng(6))
+        )
         assert other.step(2.02, 0.1) == ERROR and "stop time" in other.errors()[-1]
     one.free(), other.free()
 
@@ -119,8 +119,12 @@ def test_every_stage_comes_back(any_fmu, stage):  # noqa: F811
 def test_inputs_that_move_travel_along(any_fmu):  # noqa: F811
     inputs, outputs = any_fmu.names("input"), any_fmu.names("output")
     one, other = Instance(any_fmu).start(), Instance(any_fmu)
-    assert set_derivatives(one, inputs + inputs, [1] * len(inputs) + [2] * len(inputs),
-                           np.linspace(-1, 1, 2 * len(inputs))) == OK
+    assert (
+        set_derivatives(
+            one, inputs + inputs, [1] * len(inputs) + [2] * len(inputs), np.linspace(-1, 1, 2 * len(inputs))
+        )
+        == OK
+    )
     status, state = restored(other, serialised(one, one.save()))
     assert status == OK and other.restore(state) == OK
     for instance in (one, other):
@@ -148,18 +152,20 @@ def test_a_known_state_is_overwritten_and_any_other_pointer_replaced(any_fmu):  
 
 # -------------------------------------------------------------------------------------------------------- damaged bytes
 
+
 def checksum(body: bytes) -> int:
     """As the FMU computes it: four interleaved chains over little-endian words."""
-    odd, mask = 0x9e3779b97f4a7c15, 2**64 - 1
+    odd, mask = 0x9E3779B97F4A7C15, 2**64 - 1
 
     def mix(h, word):
         h ^= word
         return ((h << 29 | h >> 35) & mask) * odd & mask
+
     chain, whole = [1, 2, 3, 4], len(body) // 32 * 32
     for k, (word,) in enumerate(struct.iter_unpack("<Q", body[:whole])):
         chain[k % 4] = mix(chain[k % 4], word)
     for at in range(whole, len(body), 8):
-        chain[0] = mix(chain[0], int.from_bytes(body[at:at + 8], "little"))
+        chain[0] = mix(chain[0], int.from_bytes(body[at : at + 8], "little"))
     value = len(body)
     for h in chain:
         value = mix(value, h)
@@ -218,7 +224,9 @@ def test_any_byte_altered(whole):
 def test_older_and_newer_versions(whole):
     instance, data = whole
     for version in (0, 2, 77):
-        assert f"format version {version}, this FMU reads version 1" in refusal(instance, packed(data[HEADER:], version))
+        assert f"format version {version}, this FMU reads version 1" in refusal(
+            instance, packed(data[HEADER:], version)
+        )
 
 
 def test_a_state_of_another_fmu(whole, tmp_path):
@@ -241,7 +249,7 @@ def test_forged_bytes_are_refused_or_harmless(whole):
     for k in range(400):
         body = bytearray(data[HEADER:])
         for at in rng.integers(0, 120 if k % 2 else len(body), rng.integers(1, 4)):
-            body[at] = rng.choice([0, 1, 0x7f, 0x80, 0xff, rng.integers(256)])
+            body[at] = rng.choice([0, 1, 0x7F, 0x80, 0xFF, rng.integers(256)])
         status, state = restored(instance, packed(bytes(body)))
         if status == OK:
             accepted += 1
@@ -258,18 +266,19 @@ def test_wrong_arguments(whole):
     state, size, place = instance.save(), c_size_t(7), (c_char * len(data))()
     unknown = c_void_p(1)
     for function, arguments, words in (
-            ("SerializedFMUstateSize", (unknown, byref(size)), "no state"),
-            ("SerializedFMUstateSize", (None, byref(size)), "no state"),
-            ("SerializedFMUstateSize", (state, None), "null pointer"),
-            ("SerializeFMUstate", (unknown, place, c_size_t(len(data))), "no state"),
-            ("SerializeFMUstate", (state, None, c_size_t(len(data))), "null pointer"),
-            ("SerializeFMUstate", (state, place, c_size_t(len(data) - 1)), f"takes {len(data)} bytes"),
-            ("DeSerializeFMUstate", (None, c_size_t(len(data)), byref(c_void_p())), "null pointer"),
-            ("DeSerializeFMUstate", (data, c_size_t(len(data)), None), "null pointer")):
+        ("SerializedFMUstateSize", (unknown, byref(size)), "no state"),
+        ("SerializedFMUstateSize", (None, byref(size)), "no state"),
+        ("SerializedFMUstateSize", (state, None), "null pointer"),
+        ("SerializeFMUstate", (unknown, place, c_size_t(len(data))), "no state"),
+        ("SerializeFMUstate", (state, None, c_size_t(len(data))), "null pointer"),
+        ("SerializeFMUstate", (state, place, c_size_t(len(data) - 1)), f"takes {len(data)} bytes"),
+        ("DeSerializeFMUstate", (None, c_size_t(len(data)), byref(c_void_p())), "null pointer"),
+        ("DeSerializeFMUstate", (data, c_size_t(len(data)), None), "null pointer"),
+    ):
         assert instance.call(function, *arguments) == ERROR
         assert words in instance.errors()[-1]
     assert size.value == 7 and bytes(place) == bytes(len(data))
     roomy = (c_char * (len(data) + 9))()
     assert instance.call("SerializeFMUstate", state, roomy, c_size_t(len(data) + 9)) == OK
-    assert bytes(roomy)[len(data):] == bytes(9)
+    assert bytes(roomy)[len(data) :] == bytes(9)
     instance.call("FreeFMUstate", byref(state))

@@ -5,7 +5,6 @@ import sys
 from pathlib import Path
 
 import pytest
-
 import tiefmu
 
 FUZZ = Path(__file__).resolve().parent / "fuzz"

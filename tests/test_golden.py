@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
 import tiefmu
 from in_process import Run
 from independent import Problem, Spring, exponential, quaternion_product
@@ -54,8 +53,10 @@ def bushing_scene():
     """D3M0: masters on ground bushings, node 6 at the slave's place joined to it by a bushing."""
     scene = run_scene("default", 0.5, True)
     scene["mesh"]["nodes"].append([6, 0.7, 0.4, 0.5])
-    scene["node"] += [{"nodes": [1, 2, 3, 4], "mass": 2.0, "inertia": 0.4},
-                      {"nodes": [5, 6], "mass": 2.0, "inertia": 0.2}]
+    scene["node"] += [
+        {"nodes": [1, 2, 3, 4], "mass": 2.0, "inertia": 0.4},
+        {"nodes": [5, 6], "mass": 2.0, "inertia": 0.2},
+    ]
     scene["spring"] = [
         {"ground": [1, 2, 3, 4], "kind": "bushing", "stiffness": 1000.0, "rotational_stiffness": 500.0},
         {"nodes": [5, 6], "kind": "bushing", "stiffness": 4000.0, "rotational_stiffness": 300.0},
@@ -152,8 +153,11 @@ def cases():
     for name in KERNELS:
         path = GOLDEN / f"{name}.json"
         if path.exists():
-            yield from (pytest.param(name, k, id=case["name"]) for k, case in
-                        enumerate(json.loads(path.read_text())["cases"]) if not case["name"].startswith("d_spot1"))
+            yield from (
+                pytest.param(name, k, id=case["name"])
+                for k, case in enumerate(json.loads(path.read_text())["cases"])
+                if not case["name"].startswith("d_spot1")
+            )
         else:
             yield pytest.param(name, 0, id=name)  # fails with the message of `golden`
 
@@ -189,11 +193,20 @@ class OneSlave:
             keep = turns if i == 9 else self.rotations
             node.append({"nodes": [i], "mass": mass, "inertia": inertia if keep else 0.0})
         self.scene = {
-            "mesh": {"nodes": [[i + 1, *x] for i, x in enumerate(corners.tolist())] + [[9, *slave.tolist()]],
-                     "segments": [[1, *range(1, n + 1)]]},
+            "mesh": {
+                "nodes": [[i + 1, *x] for i, x in enumerate(corners.tolist())] + [[9, *slave.tolist()]],
+                "segments": [[1, *range(1, n + 1)]],
+            },
             "node": node,
-            "tie": [{"name": "tie", "segments": "all", "slaves": [9], "search_distance": 10.0,
-                     "formulation": "optimized" if optimized else "default"}],
+            "tie": [
+                {
+                    "name": "tie",
+                    "segments": "all",
+                    "slaves": [9],
+                    "search_distance": 10.0,
+                    "formulation": "optimized" if optimized else "default",
+                }
+            ],
         }
 
     def give(self, run, names, values, masters):

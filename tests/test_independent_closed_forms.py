@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-
 import tiefmu
 from in_process import Run
 from random_scenes import one_segment
@@ -51,10 +50,17 @@ def on_springs(inertia, pattern):
     return scene | {"model": {"inertia": inertia}, "integrator": {"method": "rk4"}}
 
 
-@pytest.mark.parametrize("inertia, pattern, omega2", [
-    ("consistent", [1, 1, 1, 1], 4 * K / (4 * M + MS)), ("lumped", [1, 1, 1, 1], 4 * K / (4 * M + MS)),
-    ("consistent", [1, 1, -1, -1], K / M), ("lumped", [1, 1, -1, -1], K / (M + MS / 4)),
-    ("consistent", [1, -1, -1, 1], K / M), ("lumped", [1, -1, -1, 1], K / (M + MS / 4))])
+@pytest.mark.parametrize(
+    "inertia, pattern, omega2",
+    [
+        ("consistent", [1, 1, 1, 1], 4 * K / (4 * M + MS)),
+        ("lumped", [1, 1, 1, 1], 4 * K / (4 * M + MS)),
+        ("consistent", [1, 1, -1, -1], K / M),
+        ("lumped", [1, 1, -1, -1], K / (M + MS / 4)),
+        ("consistent", [1, -1, -1, 1], K / M),
+        ("lumped", [1, -1, -1, 1], K / (M + MS / 4)),
+    ],
+)
 def test_heave_and_roll(inertia, pattern, omega2):
     run = Run(on_springs(inertia, pattern))
     omega = np.sqrt(omega2)

@@ -3,9 +3,8 @@
 import fmpy
 import numpy as np
 import pytest
-from fmpy.fmi2 import FMU2Slave
-
 import tiefmu
+from fmpy.fmi2 import FMU2Slave
 from in_process import EXPOSED, Run
 from independent import Problem
 from random_scenes import structure
@@ -20,8 +19,12 @@ class Instance:
     def __init__(self, path, folder, inputs):
         description = fmpy.read_model_description(str(path))
         self.reference = {v.name: v.valueReference for v in description.modelVariables}
-        self.fmu = FMU2Slave(guid=description.guid, unzipDirectory=fmpy.extract(str(path), str(folder)),
-                             modelIdentifier=description.coSimulation.modelIdentifier, instanceName="one")
+        self.fmu = FMU2Slave(
+            guid=description.guid,
+            unzipDirectory=fmpy.extract(str(path), str(folder)),
+            modelIdentifier=description.coSimulation.modelIdentifier,
+            instanceName="one",
+        )
         self.time = 0.0
         self.fmu.instantiate()
         self.fmu.setupExperiment(startTime=0.0)

@@ -4,7 +4,6 @@ import copy
 
 import numpy as np
 import pytest
-
 import tiefmu
 from in_process import Run
 from random_scenes import moved, one_segment, patch, renumbered, rotation, rows, slave_over, structure
@@ -19,8 +18,9 @@ def motion(run, scene, steps=40, load=None):
         run.set_of(i, "f", force)
     run.step(0.02, steps)
     ids = [row[0] for row in scene["mesh"]["nodes"]]
-    return {i: np.concatenate([run.of(i, "r"), run.of(i, "v"), run.of(i, "f") if i < 100 else np.zeros(3)])
-            for i in ids}
+    return {
+        i: np.concatenate([run.of(i, "r"), run.of(i, "v"), run.of(i, "f") if i < 100 else np.zeros(3)]) for i in ids
+    }
 
 
 @forms
@@ -89,8 +89,15 @@ def patch_scene(rng, formulation, rotations, gap):
     return {
         "mesh": {"nodes": rows(1, position) + rows(101, points), "segments": segments},
         "node": [{"nodes": "all", "rotations": rotations}],
-        "tie": [{"name": "tie", "segments": "all", "slaves": list(range(101, 101 + len(points))),
-                 "formulation": formulation, "search_distance": 10.0}],
+        "tie": [
+            {
+                "name": "tie",
+                "segments": "all",
+                "slaves": list(range(101, 101 + len(points))),
+                "formulation": formulation,
+                "search_distance": 10.0,
+            }
+        ],
     }
 
 
@@ -104,8 +111,9 @@ def drive(run, scene, velocity, spin):
     return {i: x for i, x in place.items() if i > 100}
 
 
-@pytest.mark.parametrize("formulation, rotations, gap", [("default", True, 1.0), ("default", False, 0.0),
-                                                         ("optimized", False, 1.0)])
+@pytest.mark.parametrize(
+    "formulation, rotations, gap", [("default", True, 1.0), ("default", False, 0.0), ("optimized", False, 1.0)]
+)
 @pytest.mark.parametrize("seed", range(5))
 def test_rigid_motion_of_the_masters_moves_every_slave_rigidly(seed, formulation, rotations, gap):
     rng = np.random.default_rng(seed)

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-
 from independent import clamp, default_bias, default_map, lumped, optimized_bias, optimized_map, project, shape
 from random_scenes import segment, slave_over
 from tiefmu._core import kernels
@@ -83,9 +82,13 @@ def test_bias(coupling, n):
     expected = []
     for s, d in enumerate(case.offset):
         nodes = case.nodes[case.owner[s]]
-        expected.append(np.zeros(6) if coupling == "translation" else
-                        optimized_bias(case.position[nodes], case.v[nodes], d) if coupling == "mean-motion" else
-                        default_bias(case.weight[s], case.w[nodes], d))
+        expected.append(
+            np.zeros(6)
+            if coupling == "translation"
+            else optimized_bias(case.position[nodes], case.v[nodes], d)
+            if coupling == "mean-motion"
+            else default_bias(case.weight[s], case.w[nodes], d)
+        )
     close(np.hstack(case.group.bias(case.v, case.w)), np.array(expected))
 
 
@@ -114,8 +117,9 @@ def test_lumped(coupling, n):
         nodes = case.nodes[case.owner[s]]
         shape_of = case.position[nodes]
         point = d + (shape_of.mean(axis=0) if coupling == "mean-motion" else case.weight[s] @ shape_of)
-        added = lumped(shape_of, project(shape_of, point), np.linalg.norm(d), coupling == "mean-motion", mass[s],
-                       inertia[s])
+        added = lumped(
+            shape_of, project(shape_of, point), np.linalg.norm(d), coupling == "mean-motion", mass[s], inertia[s]
+        )
         if coupling == "translation":
             added[:, 1] = 0
         np.add.at(expected, nodes, added)
@@ -150,8 +154,9 @@ def amplification(method, h, omega, c):
     return np.abs(np.linalg.eigvals(step)).max()
 
 
-@pytest.mark.parametrize("method, limit", [("central-difference", 2.0), ("symplectic-euler", 2.0), ("rk4", 2 * 2**0.5),
-                                           ("noh-bathe", 3.74)])
+@pytest.mark.parametrize(
+    "method, limit", [("central-difference", 2.0), ("symplectic-euler", 2.0), ("rk4", 2 * 2**0.5), ("noh-bathe", 3.74)]
+)
 def test_limits_without_damping(method, limit):
     assert kernels.stable_step(method, 5.0) == pytest.approx(limit / 5.0, rel=2e-3)
 

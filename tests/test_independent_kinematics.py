@@ -2,14 +2,17 @@
 
 import numpy as np
 import pytest
-
 import tiefmu
 from in_process import Run
 from independent import Problem, clamp, mean_inertia, smallest_lambda
 from random_scenes import one_segment
 
-CASES = [(n, formulation, rotations) for n in (4, 3) for formulation in ("default", "optimized")
-         for rotations in (True, False)]
+CASES = [
+    (n, formulation, rotations)
+    for n in (4, 3)
+    for formulation in ("default", "optimized")
+    for rotations in (True, False)
+]
 case = pytest.mark.parametrize("n, formulation, rotations", CASES)
 SEEDS = range(25)
 
@@ -58,8 +61,10 @@ def test_slave_motion_is_t_times_master_motion(seed, n, formulation, rotations):
 
 
 @case
-@pytest.mark.parametrize("inertia, reaction", [("lumped", "loads"), ("consistent", "loads"), ("lumped", "full"),
-                                               ("consistent", "full"), ("consistent", "split")])
+@pytest.mark.parametrize(
+    "inertia, reaction",
+    [("lumped", "loads"), ("consistent", "loads"), ("lumped", "full"), ("consistent", "full"), ("consistent", "split")],
+)
 @pytest.mark.parametrize("seed", range(8))
 def test_reactions(seed, inertia, reaction, n, formulation, rotations):
     case = Driven(seed, n, formulation, rotations, inertia=inertia, reaction=reaction)
@@ -152,8 +157,10 @@ def test_hourglass_work_on_a_flat_quad(formulation, expected):
     """THEORY 8: on the unit square sum h_i f_i = xi eta F by the default, nothing by the optimized formulation."""
     s, t, force = 0.4, -0.7, np.array([1.0, -2.0, 3.0])
     scene = {
-        "mesh": {"nodes": [[1, 0, 0, 0], [2, 1, 0, 0], [3, 1, 1, 0], [4, 0, 1, 0], [5, (1 + s) / 2, (1 + t) / 2, 0]],
-                 "segments": [[1, 1, 2, 3, 4]]},
+        "mesh": {
+            "nodes": [[1, 0, 0, 0], [2, 1, 0, 0], [3, 1, 1, 0], [4, 0, 1, 0], [5, (1 + s) / 2, (1 + t) / 2, 0]],
+            "segments": [[1, 1, 2, 3, 4]],
+        },
         "tie": [{"name": "tie", "segments": "all", "slaves": [5], "formulation": formulation}],
     }
     run = Run(scene, inputs={"slave[1].f": force})

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-
 import tiefmu
 from independent import Problem
 from random_scenes import patch, rows
@@ -23,8 +22,14 @@ def surface(rng, rotations, ties, slaves=120):
             phi = rng.dirichlet(np.full(len(corners), 3.0))
             points.append(phi @ corners + gap * np.array([0, 0, 1.0]) * rng.uniform(0.5, 1))
         last = FIRST_SLAVE + len(points)
-        tables.append({"name": str(number), "segments": [segments[e][0] for e in part], "formulation": formulation,
-                       "slaves": list(range(last - len(own), last))})
+        tables.append(
+            {
+                "name": str(number),
+                "segments": [segments[e][0] for e in part],
+                "formulation": formulation,
+                "slaves": list(range(last - len(own), last)),
+            }
+        )
     turn = all(formulation == "optimized" for formulation, _ in ties) or rotations
     slave_ids = [FIRST_SLAVE + k for k in range(len(points))]
     initial = []
@@ -33,20 +38,34 @@ def surface(rng, rotations, ties, slaves=120):
         initial.append({"nodes": [i], "v": v} | ({"w": w} if rotations else {}))
     return {
         "mesh": {"nodes": rows(1, position) + rows(FIRST_SLAVE, points), "segments": segments},
-        "node": [{"nodes": "all", "motion": "free", "rotations": rotations, "mass": 0.3,
-                  "inertia": 0.02 if rotations else 0.0},
-                 {"nodes": [5, 6, 17], "motion": "fixed"},
-                 {"nodes": slave_ids, "mass": 0.5, "inertia": 0.05 if turn else 0.0}],
+        "node": [
+            {
+                "nodes": "all",
+                "motion": "free",
+                "rotations": rotations,
+                "mass": 0.3,
+                "inertia": 0.02 if rotations else 0.0,
+            },
+            {"nodes": [5, 6, 17], "motion": "fixed"},
+            {"nodes": slave_ids, "mass": 0.5, "inertia": 0.05 if turn else 0.0},
+        ],
         "tie": tables,
         "initial": [table for table in initial if table["nodes"][0] not in (5, 6, 17)],
         "model": {"inertia": "consistent", "gravity": [1.0, -2.0, 3.0]},
     }
 
 
-@pytest.mark.parametrize("rotations, ties", [
-    (True, [("default", 0.3)]), (False, [("optimized", 0.3)]), (False, [("optimized", 0.0), ("default", 0.0)]),
-    (True, [("default", 0.3), ("optimized", 0.3)]), (False, [("default", 0.0)])],
-    ids=["default", "optimized", "translation", "mixed", "factored"])
+@pytest.mark.parametrize(
+    "rotations, ties",
+    [
+        (True, [("default", 0.3)]),
+        (False, [("optimized", 0.3)]),
+        (False, [("optimized", 0.0), ("default", 0.0)]),
+        (True, [("default", 0.3), ("optimized", 0.3)]),
+        (False, [("default", 0.0)]),
+    ],
+    ids=["default", "optimized", "translation", "mixed", "factored"],
+)
 @pytest.mark.parametrize("geometry", ["finite", "small"])
 def test_accelerations_solve_the_constrained_equations(rotations, ties, geometry):
     scene = surface(np.random.default_rng(31), rotations, ties)
@@ -61,6 +80,6 @@ def test_accelerations_solve_the_constrained_equations(rotations, ties, geometry
     place = [problem.ids.index(i) for i in nodes["id"].tolist()]
     found[place, :3] = simulation.get("acceleration")
     if rotations:
-        found[place[:nodes["rotating"]], 3:] = simulation.get("angular_acceleration")
+        found[place[: nodes["rotating"]], 3:] = simulation.get("angular_acceleration")
     assert np.abs(expected).max() > 1
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-11 * np.abs(expected).max())

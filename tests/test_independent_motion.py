@@ -1,14 +1,13 @@
 """Whole motions of free, mixed and damped structures against a tight DOP853 solution of independent.py."""
 
-from functools import lru_cache
+from functools import cache
 
 import numpy as np
 import pytest
-from scipy.integrate import simpson
-
 from in_process import Run
 from independent import Problem
 from random_scenes import structure
+from scipy.integrate import simpson
 
 END = 0.4
 FORMS = [("default", True), ("default", False), ("optimized", False), ("optimized", True)]
@@ -48,7 +47,7 @@ def half_driven(scene):
     return inputs
 
 
-@lru_cache(maxsize=None)
+@cache
 def case(kind, formulation, rotations, inertia, geometry="finite"):
     """(scene, inputs by node id, solution at END)."""
     scene = structure(np.random.default_rng(11), formulation, rotations, inertia)
@@ -86,11 +85,16 @@ def difference(program, problem, expected):
     worst = 0.0
     for k, i in enumerate(problem.ids):
         pairs = [("r", expected["x"][k]), ("v", expected["v"][k]), ("w", expected["w"][k])]
-        worst = max([worst] + [np.abs(program.of(i, n) - value).max() for n, value in pairs
-                               if f"{program.names[i]}.{n}" in program])
+        worst = max(
+            [worst]
+            + [np.abs(program.of(i, n) - value).max() for n, value in pairs if f"{program.names[i]}.{n}" in program]
+        )
     for k, s in enumerate(problem.slaves):
-        worst = max(worst, np.abs(program.of(s.id, "r") - expected["slave_x"][k]).max(),
-                    np.abs(program.of(s.id, "v") - expected["slave_v"][k]).max())
+        worst = max(
+            worst,
+            np.abs(program.of(s.id, "r") - expected["slave_x"][k]).max(),
+            np.abs(program.of(s.id, "v") - expected["slave_v"][k]).max(),
+        )
     return worst
 
 
@@ -139,20 +143,21 @@ def test_small_geometry(inertia, formulation, rotations):
 
 
 @forms
-@pytest.mark.parametrize("method, order", [("central-difference", 2), ("symplectic-euler", 1), ("noh-bathe", 2),
-                                           ("rk4", 4)])
+@pytest.mark.parametrize(
+    "method, order", [("central-difference", 2), ("symplectic-euler", 1), ("noh-bathe", 2), ("rk4", 4)]
+)
 def test_order(method, order, formulation, rotations):
     """Three halvings divide the error of the motion by 2^order each; consistent inertia, finite rotation."""
     scene, inputs, problem, solution = case("swinging", formulation, rotations, "consistent")
-    errors = [difference(run(scene, inputs, method, steps)[0], problem, solution[-1])
-              for steps in (100, 200, 400, 800)]
+    errors = [difference(run(scene, inputs, method, steps)[0], problem, solution[-1]) for steps in (100, 200, 400, 800)]
     orders = np.log2(np.array(errors[:-1]) / errors[1:])
     assert np.all(np.abs(orders - order) < 0.3), errors
 
 
 @forms
-@pytest.mark.parametrize("method, order", [("central-difference", 2), ("symplectic-euler", 1), ("noh-bathe", 2),
-                                           ("rk4", 4)])
+@pytest.mark.parametrize(
+    "method, order", [("central-difference", 2), ("symplectic-euler", 1), ("noh-bathe", 2), ("rk4", 4)]
+)
 def test_energy_of_consistent_inertia_is_constant_to_the_order(method, order, formulation, rotations):
     scene, inputs, *_ = case("swinging", formulation, rotations, "consistent")
     changes = [run(scene, inputs, method, steps)[1] for steps in (100, 200, 400, 800)]
@@ -165,13 +170,25 @@ def test_true_energy_drifts_with_lumped_inertia_only(formulation):
     """THEORY 4: with m_s/m_i = 0.7 and an offset of 0.4 edges by per cents, whatever the step."""
     rotations = formulation == "default"
     scene = {
-        "mesh": {"nodes": [[1, 0, 0, 0], [2, 1, 0, 0], [3, 1, 1, 0], [4, 0, 1, 0], [5, 0.7, 0.4, 0.4]],
-                 "segments": [[1, 1, 2, 3, 4]]},
-        "node": [{"nodes": "all", "motion": "free", "rotations": rotations, "mass": 1.0,
-                  "inertia": 0.1 if rotations else 0.0}, {"nodes": [5], "mass": 0.7, "inertia": 0.0}],
+        "mesh": {
+            "nodes": [[1, 0, 0, 0], [2, 1, 0, 0], [3, 1, 1, 0], [4, 0, 1, 0], [5, 0.7, 0.4, 0.4]],
+            "segments": [[1, 1, 2, 3, 4]],
+        },
+        "node": [
+            {
+                "nodes": "all",
+                "motion": "free",
+                "rotations": rotations,
+                "mass": 1.0,
+                "inertia": 0.1 if rotations else 0.0,
+            },
+            {"nodes": [5], "mass": 0.7, "inertia": 0.0},
+        ],
         "tie": [{"name": "tie", "segments": "all", "slaves": [5], "formulation": formulation}],
-        "spring": [{"ground": [1, 2, 3, 4], "kind": "bushing", "stiffness": 100.0}
-                   | ({"rotational_stiffness": 10.0} if rotations else {})],
+        "spring": [
+            {"ground": [1, 2, 3, 4], "kind": "bushing", "stiffness": 100.0}
+            | ({"rotational_stiffness": 10.0} if rotations else {})
+        ],
         "initial": [{"nodes": [1], "v": [0.1, 0, 0.3]}, {"nodes": [3], "v": [0, 0.2, -0.2]}],
         "integrator": {"method": "rk4"},
     }

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-
 from in_process import Run
 from independent import Problem
 from random_scenes import rotation
@@ -62,13 +61,17 @@ def free_flight(formulation, inertia, seed=3):
     pairs = [(1, 2), (2, 3), (3, 4), (4, 1), (1, 3), (2, 4), (1, 5), (2, 5), (3, 5), (4, 5)]
     scene = {
         "mesh": {"nodes": [[k + 1, *p.tolist()] for k, p in enumerate(x)], "segments": [[1, 1, 2, 3, 4]]},
-        "node": [{"nodes": "all", "motion": "free", "mass": 1.0},
-                 {"nodes": [1, 2, 3, 4], "rotations": rotations, "inertia": 0.3 if rotations else 0.0},
-                 {"nodes": [6], "mass": 2.0, "inertia": 0.2}],
+        "node": [
+            {"nodes": "all", "motion": "free", "mass": 1.0},
+            {"nodes": [1, 2, 3, 4], "rotations": rotations, "inertia": 0.3 if rotations else 0.0},
+            {"nodes": [6], "mass": 2.0, "inertia": 0.2},
+        ],
         "tie": [{"name": "tie", "segments": "all", "slaves": [6], "formulation": formulation}],
         "spring": [{"nodes": list(p), "kind": "axial", "stiffness": 300.0} for p in pairs],
-        "initial": [{"nodes": [k + 1], "v": (v + np.cross(w, p)).tolist()} | ({"w": w.tolist()} if rotations and k < 4
-                    else {}) for k, p in enumerate(x[:5])],
+        "initial": [
+            {"nodes": [k + 1], "v": (v + np.cross(w, p)).tolist()} | ({"w": w.tolist()} if rotations and k < 4 else {})
+            for k, p in enumerate(x[:5])
+        ],
         "model": {"inertia": inertia},
         "integrator": {"method": "rk4"},
     }
@@ -92,8 +95,9 @@ def test_free_flight(formulation, inertia):
             mass, inertias = mass + added[:, 0], inertias + added[:, 1]
         else:
             bodies.append((2.0, 0.2, run.of(6, "r"), run.of(6, "v"), run.of(6, "w")))
-        bodies += [(mass[k], inertias[k], run.of(i, "r"), run.of(i, "v"), run.of(i, "w"))
-                   for k, i in enumerate(problem.ids)]
+        bodies += [
+            (mass[k], inertias[k], run.of(i, "r"), run.of(i, "v"), run.of(i, "w")) for k, i in enumerate(problem.ids)
+        ]
         for m, turning, x, v, w in bodies:
             linear, angular = linear + m * v, angular + m * np.cross(x, v) + turning * w
         return linear, angular

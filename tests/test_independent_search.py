@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-
 import tiefmu
 from independent import default_search_distance, find
 from random_scenes import patch, rows
@@ -12,8 +11,16 @@ def search_scene(position, segments, points, method, reach):
     return {
         "mesh": {"nodes": rows(1, position) + rows(10001, points), "segments": segments},
         "node": [{"nodes": "all", "rotations": True}],
-        "tie": [{"name": "tie", "segments": "all", "slaves": list(range(10001, 10001 + len(points))),
-                 "search": method, "search_distance": reach, "unresolved": "drop"}],
+        "tie": [
+            {
+                "name": "tie",
+                "segments": "all",
+                "slaves": list(range(10001, 10001 + len(points))),
+                "search": method,
+                "search_distance": reach,
+                "unresolved": "drop",
+            }
+        ],
     }
 
 
@@ -32,8 +39,9 @@ def found_by_brute_force(position, segments, points, method, reach):
     return {10001 + k: None if e is None else ids[e] for k, (e, _) in enumerate(winners)}
 
 
-@pytest.mark.parametrize("method, reach, seed", [("box", 0.0, 1), ("box", 0.6, 2), ("nearest-node", 2.0, 3),
-                                                 ("nearest-node", 0.9, 4)])
+@pytest.mark.parametrize(
+    "method, reach, seed", [("box", 0.0, 1), ("box", 0.6, 2), ("nearest-node", 2.0, 3), ("nearest-node", 0.9, 4)]
+)
 def test_random_slaves(method, reach, seed):
     """4 x 2500 slaves above, below and beside a warped patch of quads and triangles."""
     rng = np.random.default_rng(seed)
@@ -56,11 +64,15 @@ def test_ties_are_resolved_the_same_after_shuffling(method, reach):
     scene = search_scene(position, segments, points, method, reach)
     assert found_by_program(scene) == expected
     for _ in range(5):
-        mesh = {"nodes": [scene["mesh"]["nodes"][k] for k in rng.permutation(len(scene["mesh"]["nodes"]))],
-                "segments": [segments[k] for k in rng.permutation(len(segments))]}
+        mesh = {
+            "nodes": [scene["mesh"]["nodes"][k] for k in rng.permutation(len(scene["mesh"]["nodes"]))],
+            "segments": [segments[k] for k in rng.permutation(len(segments))],
+        }
         tie = scene["tie"][0]
-        tie = tie | {"slaves": [tie["slaves"][k] for k in rng.permutation(len(tie["slaves"]))],
-                     "segments": [int(k) + 1 for k in rng.permutation(len(segments))]}
+        tie = tie | {
+            "slaves": [tie["slaves"][k] for k in rng.permutation(len(tie["slaves"]))],
+            "segments": [int(k) + 1 for k in rng.permutation(len(segments))],
+        }
         assert found_by_program(scene | {"mesh": mesh, "tie": [tie]}) == expected
 
 

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-
 import tiefmu
 from in_process import Run
 from independent import Problem
@@ -65,10 +64,15 @@ def test_nodal_step_is_seed_3(seed, formulation, rotations):
 def test_nodal_step_is_no_bound_with_offset():
     """THEORY 6: massless masters, a spring from the slave to an equal free mass: dt_crit/dt_nodal = sqrt(2/3)."""
     scene = {
-        "mesh": {"nodes": [[1, -1, -1, 0], [2, 1, -1, 0], [3, 1, 1, 0], [4, -1, 1, 0], [5, 0, 0, 0.3], [6, 1, 0, 0.3]],
-                 "segments": [[1, 1, 2, 3, 4]]},
-        "node": [{"nodes": "all", "motion": "free", "rotations": True}, {"nodes": [5], "mass": 2.0},
-                 {"nodes": [6], "mass": 2.0, "rotations": False}],
+        "mesh": {
+            "nodes": [[1, -1, -1, 0], [2, 1, -1, 0], [3, 1, 1, 0], [4, -1, 1, 0], [5, 0, 0, 0.3], [6, 1, 0, 0.3]],
+            "segments": [[1, 1, 2, 3, 4]],
+        },
+        "node": [
+            {"nodes": "all", "motion": "free", "rotations": True},
+            {"nodes": [5], "mass": 2.0},
+            {"nodes": [6], "mass": 2.0, "rotations": False},
+        ],
         "tie": [{"name": "tie", "segments": "all", "slaves": [5]}],
         "spring": [{"nodes": [5, 6], "kind": "axial", "stiffness": 100.0}],
     }
@@ -112,11 +116,25 @@ def test_motion_stays_bounded_near_the_limit(speed, safety, method, formulation,
 def test_a_rivet_between_slaves_outside_their_segments():
     """THEORY 9: elsewhere 1e38 by cycle 33."""
     scene = {
-        "mesh": {"nodes": [[1, 0, 0, 0], [2, 1, 0, 0], [3, 1, 1, 0], [4, 0, 1, 0], [11, 0, 0, 1], [12, 1, 0, 1],
-                           [13, 1, 1, 1], [14, 0, 1, 1], [5, 1.2, 1.2, 0.3], [15, 1.2, 1.2, 0.8]],
-                 "segments": [[1, 1, 2, 3, 4], [2, 11, 12, 13, 14]]},
-        "node": [{"nodes": "all", "motion": "free", "rotations": True, "mass": 0.1, "inertia": 0.01},
-                 {"nodes": [5, 15], "mass": 1.0, "inertia": 0.1}],
+        "mesh": {
+            "nodes": [
+                [1, 0, 0, 0],
+                [2, 1, 0, 0],
+                [3, 1, 1, 0],
+                [4, 0, 1, 0],
+                [11, 0, 0, 1],
+                [12, 1, 0, 1],
+                [13, 1, 1, 1],
+                [14, 0, 1, 1],
+                [5, 1.2, 1.2, 0.3],
+                [15, 1.2, 1.2, 0.8],
+            ],
+            "segments": [[1, 1, 2, 3, 4], [2, 11, 12, 13, 14]],
+        },
+        "node": [
+            {"nodes": "all", "motion": "free", "rotations": True, "mass": 0.1, "inertia": 0.01},
+            {"nodes": [5, 15], "mass": 1.0, "inertia": 0.1},
+        ],
         "tie": [{"name": "a", "segments": [1], "slaves": [5]}, {"name": "b", "segments": [2], "slaves": [15]}],
         "spring": [{"nodes": [5, 15], "kind": "bushing", "stiffness": 1e5, "rotational_stiffness": 1e4}],
         "initial": [{"nodes": [1, 2], "v": [0.01, 0, 0.01]}],

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-
 import tiefmu
 from fmu_calls import OK, Fmu, Instance, set_derivatives
 from port_scenes import PORTS, Pair, exponential, names, ported, vector
@@ -29,8 +28,9 @@ def same(pair: Pair, tolerance=1e-12, skip=()):
         if block["name"] in skip:
             continue
         found, expected = (s.get_values(names(block)) for s in (pair.ports, pair.nodes))
-        np.testing.assert_allclose(found, expected, rtol=tolerance, atol=tolerance * (1 + np.abs(expected).max()),
-                                   err_msg=block["name"])
+        np.testing.assert_allclose(
+            found, expected, rtol=tolerance, atol=tolerance * (1 + np.abs(expected).max()), err_msg=block["name"]
+        )
         count += len(found)
     assert count > 20
 
@@ -41,8 +41,11 @@ def hand_spread(pair: Pair, port: str, force, moment) -> dict[int, tuple[np.ndar
     if len(nodes) == 1:
         lever = vector(pair.ports, f"port[{port}].r") - pair.of(nodes[0], "r")
         return {nodes[0]: (force, moment + np.cross(lever, force))}
-    x = np.array([pair.start[i] for i in nodes]) if pair.made["model"]["geometry"] == "small" else \
-        np.array([pair.of(i, "r") for i in nodes])
+    x = (
+        np.array([pair.start[i] for i in nodes])
+        if pair.made["model"]["geometry"] == "small"
+        else np.array([pair.of(i, "r") for i in nodes])
+    )
     centre = x.mean(axis=0)
     arms = x - centre
     lever = vector(pair.ports, f"port[{port}].r") - np.mean([pair.of(i, "r") for i in nodes], axis=0)
@@ -74,8 +77,11 @@ def drive(pair: Pair, rng):
     accelerations = pair.made["model"]["reaction"] != "loads"
     for port, row in pair.port.items():
         if row["moves"] != "slaves":
-            pair.drive(port, *rng.normal(size=(4 if accelerations else 2, 3)),
-                       finite=pair.made["model"]["geometry"] == "finite")
+            pair.drive(
+                port,
+                *rng.normal(size=(4 if accelerations else 2, 3)),
+                finite=pair.made["model"]["geometry"] == "finite",
+            )
 
 
 @pytest.mark.parametrize("motions", ["driven", "mixed"])
@@ -99,8 +105,9 @@ def test_an_instant(settings, motions):
         arms = np.array([pair.arm("base", i) for i in base["nodes"]])
         moments = np.array([pair.of(i, "t") for i in base["nodes"]])
         np.testing.assert_allclose(vector(pair.ports, "port[base].f"), forces.sum(axis=0), atol=1e-11)
-        np.testing.assert_allclose(vector(pair.ports, "port[base].t"), (np.cross(arms, forces) + moments).sum(axis=0),
-                                   atol=1e-11)
+        np.testing.assert_allclose(
+            vector(pair.ports, "port[base].t"), (np.cross(arms, forces) + moments).sum(axis=0), atol=1e-11
+        )
 
 
 @pytest.mark.parametrize("settings", SETTINGS, ids=IDS)
@@ -122,8 +129,9 @@ def test_a_port_of_slaves_moves_as_they_do_on_the_mean(settings):
         np.testing.assert_allclose(sum(f for f, _ in loads.values()), force, atol=1e-12)
         about = vector(pair.ports, f"port[{port}].r")
         places = {i: pair.start[i] if made["model"]["geometry"] == "small" else pair.of(i, "r") for i in loads}
-        np.testing.assert_allclose(sum(np.cross(places[i] - about, f) + t for i, (f, t) in loads.items()), moment,
-                                   atol=1e-11)
+        np.testing.assert_allclose(
+            sum(np.cross(places[i] - about, f) + t for i, (f, t) in loads.items()), moment, atol=1e-11
+        )
         if len(loads) == 1:
             np.testing.assert_array_equal(w, pair.of(row["nodes"][0], "w"))
 
@@ -181,8 +189,9 @@ def test_free_nodes_beside_a_translating_port(method):
     same(pair, 1e-11, skip={"power_residual"})
 
 
-@pytest.mark.parametrize("method, order", [("central-difference", 2), ("symplectic-euler", 1), ("noh-bathe", 2),
-                                           ("rk4", 3.5)])
+@pytest.mark.parametrize(
+    "method, order", [("central-difference", 2), ("symplectic-euler", 1), ("noh-bathe", 2), ("rk4", 3.5)]
+)
 def test_free_nodes_beside_a_turning_port(method, order):
     """Against many times smaller steps, and against nodes that get the port's velocities anew 2000 times."""
     rng = np.random.default_rng(5)
@@ -200,6 +209,7 @@ def test_free_nodes_beside_a_turning_port(method, order):
         pair.drive("base", v, w, 0 * a, 0 * z), pair.drive("arm", -v, w, 0 * a, 0 * z)
         pair.ports.step(1.0)
         return pair.ports.get("velocity")[-6:], pair
+
     (coarse, _), (fine, _), (finest, pair) = end(0.05), end(0.025), end(0.001)
     free = pair.ports.get("velocity")
     assert np.log2(np.abs(coarse - finest).max() / np.abs(fine - finest).max()) > order - 0.35
@@ -249,11 +259,15 @@ def test_a_thousand_revolutions(formulation, rotations):
     np.testing.assert_allclose(simulation.get("slave_position") - moved, turned, atol=1e-10)
     # A port of slaves that ride on it has its motion, and its lever turns with them.
     lever = np.array(PORTS[2]["at"]) - place
-    np.testing.assert_allclose(vector(simulation, "port[load].r") - moved, exponential(0.3 * per * axis) @ lever,
-                               atol=1e-10)
+    np.testing.assert_allclose(
+        vector(simulation, "port[load].r") - moved, exponential(0.3 * per * axis) @ lever, atol=1e-10
+    )
     np.testing.assert_allclose(vector(simulation, "port[load].w"), per * axis, atol=1e-12)
-    np.testing.assert_allclose(vector(simulation, "port[load].v"),
-                               [1e-3, 0, 0] + np.cross(per * axis, exponential(0.3 * per * axis) @ lever), atol=1e-10)
+    np.testing.assert_allclose(
+        vector(simulation, "port[load].v"),
+        [1e-3, 0, 0] + np.cross(per * axis, exponential(0.3 * per * axis) @ lever),
+        atol=1e-10,
+    )
 
 
 def test_loads_pass_from_a_port_of_slaves_to_one_of_masters_whole():
@@ -283,8 +297,11 @@ def test_springs_on_a_ports_own_nodes_are_in_its_resultant():
     for _ in range(4):
         drive(pair, rng)
         slave, point, node = 101, 201, 5
-        x = {201: vector(pair.ports, "port[arm].r"), 101: pair.of(101, "r"),
-             5: vector(pair.ports, "port[base].r") + pair.arm("base", 5)}
+        x = {
+            201: vector(pair.ports, "port[arm].r"),
+            101: pair.of(101, "r"),
+            5: vector(pair.ports, "port[base].r") + pair.arm("base", 5),
+        }
         v = {201: vector(pair.ports, "port[arm].v"), 101: pair.of(101, "v"), 5: pair.of(5, "v")}
         line, rest = x[slave] - x[point], pair.start[slave] - pair.start[point]
         bushing = np.array([3.0, 4.0, 5.0]) * (line - rest) + np.array([0.5, 0.7, 0.9]) * (v[slave] - v[point])
@@ -301,8 +318,18 @@ def line_of_slaves(turning: bool, at=None, nodes=(101, 102, 103)) -> dict:
     """Three slaves on a line along x over a quad, each alone free to be turned by its masters."""
     port = {"name": "rod", "nodes": list(nodes)} | ({"at": at} if at else {})
     return {
-        "mesh": {"nodes": [[1, 0, 0, 0], [2, 3, 0, 0], [3, 3, 1, 0], [4, 0, 1, 0], [101, 0.5, 0.5, 0.2],
-                           [102, 1.1, 0.5, 0.2], [103, 2.4, 0.5, 0.2]], "segments": [[1, 1, 2, 3, 4]]},
+        "mesh": {
+            "nodes": [
+                [1, 0, 0, 0],
+                [2, 3, 0, 0],
+                [3, 3, 1, 0],
+                [4, 0, 1, 0],
+                [101, 0.5, 0.5, 0.2],
+                [102, 1.1, 0.5, 0.2],
+                [103, 2.4, 0.5, 0.2],
+            ],
+            "segments": [[1, 1, 2, 3, 4]],
+        },
         "node": [{"nodes": "all", "rotations": turning, "mass": 1.0}],
         "tie": [{"name": "tie", "slaves": [101, 102, 103], "search_distance": 1.0}],
         "interface": {"ports": [port], "expose": ["slave.r", "port.r", "power_residual"]},
@@ -368,13 +395,21 @@ def test_a_moving_input_turns_the_port_as_its_integral(tmp_path):
         for k in range(steps):
             t = k * h
             assert instance.set(dict(zip(w + v, [*(np.array([1, t, t * t / 2]) @ spins), *[shift * t] * 3]))) == OK
-            assert set_derivatives(instance, w + w + v, [1] * 3 + [2] * 3 + [1] * 3,
-                                   [*(spins[1] + t * spins[2]), *spins[2], *[shift] * 3]) == OK
+            assert (
+                set_derivatives(
+                    instance,
+                    w + w + v,
+                    [1] * 3 + [2] * 3 + [1] * 3,
+                    [*(spins[1] + t * spins[2]), *spins[2], *[shift] * 3],
+                )
+                == OK
+            )
             assert instance.step(t, h) == OK, instance.log
         arms.append(instance.get(slave) - instance.get(places))
         moved = instance.get(places) - start
         instance.free()
         return *arms, moved
+
     axis = np.array([0.48, -0.6, 0.64])
     before, after, moved = run(np.array([0.5, 2.0, -3.0])[:, None] * axis, 3, shift=0.8)
     np.testing.assert_allclose(after, exponential((0.5 + 2.0 / 2 - 3.0 / 6) * axis) @ before, atol=1e-12)
@@ -411,21 +446,36 @@ def test_the_interface_of_a_large_tie_has_24_variables():
     y, x = np.meshgrid(np.arange(side + 1.0), np.arange(side + 1.0), indexing="ij")
     low = np.column_stack([1 + np.arange(x.size), x.ravel(), y.ravel(), np.zeros(x.size)])
     first = 20001
-    high = np.column_stack([first + np.arange(side * side), x[:-1, :-1].ravel() + 0.4, y[:-1, :-1].ravel() + 0.3,
-                            np.full(side * side, 0.1)])
+    high = np.column_stack(
+        [
+            first + np.arange(side * side),
+            x[:-1, :-1].ravel() + 0.4,
+            y[:-1, :-1].ravel() + 0.3,
+            np.full(side * side, 0.1),
+        ]
+    )
     corner = (1 + np.arange(side)[:, None] * (side + 1) + np.arange(side)).ravel()
     quads = np.column_stack([1 + np.arange(side * side), corner, corner + 1, corner + side + 2, corner + side + 1])
-    scene = tiefmu.load({
-        "mesh": {"nodes": [[int(row[0]), *row[1:]] for row in np.vstack([low, high]).tolist()],
-                 "segments": quads.tolist()},
-        "node": [{"nodes": "all", "mass": 0.1}],
-        "tie": [{"name": "glue", "slaves": high[:, 0].astype(int).tolist(), "formulation": "optimized"}],
-        "interface": {"ports": [{"name": "lower", "nodes": low[:, 0].astype(int).tolist()},
-                                {"name": "upper", "nodes": high[:, 0].astype(int).tolist()}]},
-    })
+    scene = tiefmu.load(
+        {
+            "mesh": {
+                "nodes": [[int(row[0]), *row[1:]] for row in np.vstack([low, high]).tolist()],
+                "segments": quads.tolist(),
+            },
+            "node": [{"nodes": "all", "mass": 0.1}],
+            "tie": [{"name": "glue", "slaves": high[:, 0].astype(int).tolist(), "formulation": "optimized"}],
+            "interface": {
+                "ports": [
+                    {"name": "lower", "nodes": low[:, 0].astype(int).tolist()},
+                    {"name": "upper", "nodes": high[:, 0].astype(int).tolist()},
+                ]
+            },
+        }
+    )
     listed = [name for block in scene.start.variables for name in names(block)]
-    assert sorted(listed) == sorted(f"port[{port}].{key}[{k}]" for port in ("lower", "upper") for key in "vwft"
-                                    for k in (1, 2, 3))
+    assert sorted(listed) == sorted(
+        f"port[{port}].{key}[{k}]" for port in ("lower", "upper") for key in "vwft" for k in (1, 2, 3)
+    )
     simulation = scene.simulation()
     simulation.initialise(0.0)
     rng = np.random.default_rng(12)
@@ -444,8 +494,10 @@ def test_initial_velocities_become_the_ports():
     made = ported(np.random.default_rng(13), ("default", True, "lumped", "loads", "finite"))
     v, w = np.array([3.0, 1.0, -2.0]), np.array([0.5, -1.0, 2.0])
     position = {row[0]: np.array(row[1:]) for row in made["mesh"]["nodes"]}
-    made["initial"] = [{"nodes": [i], "v": (v + np.cross(w, position[i] - PORTS[0]["at"])).tolist(), "w": w.tolist()}
-                       for i in PORTS[0]["nodes"]]
+    made["initial"] = [
+        {"nodes": [i], "v": (v + np.cross(w, position[i] - PORTS[0]["at"])).tolist(), "w": w.tolist()}
+        for i in PORTS[0]["nodes"]
+    ]
     simulation = tiefmu.load(made).simulation()
     np.testing.assert_allclose(vector(simulation, "port[base].v"), v, atol=1e-12)
     np.testing.assert_array_equal(vector(simulation, "port[base].w"), w)
@@ -461,21 +513,28 @@ def test_set_members_outside_every_tie_are_passed_over(tmp_path):
         "*NODE\n1,0,0,0\n2,1,0,0\n3,1,1,0\n4,0,1,0\n5,2,0,0\n6,2,1,0\n"
         "101,0.3,0.4,0.1\n102,0.6,0.7,0.1\n103,0.2,0.8,0.1\n"
         "*ELEMENT, TYPE=S4\n1,1,2,3,4\n2,2,5,6,3\n*NSET, NSET=lower\n1,2,3,4,5,6\n*NSET, NSET=upper\n101,102,103\n"
-        "*NSET, NSET=mixed\n1,101\n*NSET, NSET=far\n5,6\n")
-    made = {"mesh": {"file": str(tmp_path / "panel.inp")}, "node": [{"nodes": "all", "mass": 1.0}],
-            "tie": [{"name": "tie", "slaves": "upper", "formulation": "optimized"}],
-            "interface": {"ports": ["lower", "upper"]}}
+        "*NSET, NSET=mixed\n1,101\n*NSET, NSET=far\n5,6\n"
+    )
+    made = {
+        "mesh": {"file": str(tmp_path / "panel.inp")},
+        "node": [{"nodes": "all", "mass": 1.0}],
+        "tie": [{"name": "tie", "slaves": "upper", "formulation": "optimized"}],
+        "interface": {"ports": ["lower", "upper"]},
+    }
     report = tiefmu.report(tiefmu.load(made))
     held = {row["name"]: row["nodes"] for row in report["ports"]}
     assert held == {"lower": [1, 2, 3, 4], "upper": [101, 102, 103]}
     np.testing.assert_allclose(report["ports"][0]["at"], [0.5, 0.5, 0], atol=1e-15)
     assert report["notes"] == ["interface: port 'lower': 2 of 6 nodes left out: no tie and no spring uses them"]
-    for ports, line in ((["lower", {"name": "b", "nodes": "mixed"}], "port 'b': node 1: is already in port 'lower'; a "
-                         "node can be in one port only"),
-                        (["mixed"], "port 'mixed': holds slaves (node 101) and nodes that are none (node 1); make two "
-                         "ports of them"),
-                        (["far"], "port 'far': no tie and no spring uses any of its nodes"),
-                        (["uper"], "port 'uper': the mesh has no set 'uper'; did you mean 'upper'?")):
+    for ports, line in (
+        (
+            ["lower", {"name": "b", "nodes": "mixed"}],
+            "port 'b': node 1: is already in port 'lower'; a node can be in one port only",
+        ),
+        (["mixed"], "port 'mixed': holds slaves (node 101) and nodes that are none (node 1); make two ports of them"),
+        (["far"], "port 'far': no tie and no spring uses any of its nodes"),
+        (["uper"], "port 'uper': the mesh has no set 'uper'; did you mean 'upper'?"),
+    ):
         made["interface"]["ports"] = ports
         with pytest.raises(tiefmu.SceneError) as error:
             tiefmu.load(made)
@@ -486,8 +545,10 @@ def test_slaves_on_a_line_without_rotations_are_refused():
     for nodes, what in (([101, 102, 103], "its slaves are collinear and"), ([102], "its only slave")):
         with pytest.raises(tiefmu.SceneError) as error:
             tiefmu.load(line_of_slaves(False, None, nodes))
-        assert str(error.value) == (f"scene: interface: port 'rod': {what} cannot turn, which leaves its rotation "
-                                    "open; use formulation = \"optimized\" or rotations = true")
+        assert str(error.value) == (
+            f"scene: interface: port 'rod': {what} cannot turn, which leaves its rotation "
+            'open; use formulation = "optimized" or rotations = true'
+        )
 
 
 def test_units_and_hidden_variables():
@@ -503,8 +564,11 @@ def test_units_and_hidden_variables():
     assert "port[rod].v[1]" in listed and "port[rod].w[1]" not in listed
 
 
-@pytest.mark.parametrize("settings", [s for s in SETTINGS if s[2:] == ("consistent", "full", "finite")
-                                      or s[2:] == ("consistent", "split", "finite")], ids=lambda s: "-".join(map(str, s)))
+@pytest.mark.parametrize(
+    "settings",
+    [s for s in SETTINGS if s[2:] == ("consistent", "full", "finite") or s[2:] == ("consistent", "split", "finite")],
+    ids=lambda s: "-".join(map(str, s)),
+)
 def test_the_energy_balance_closes_with_the_order_of_the_method(settings):
     """Work of ports that turn and are loaded, beside free masters, springs, dampers and gravity."""
     made = ported(np.random.default_rng(5), settings, motions="mixed")
@@ -521,5 +585,6 @@ def test_the_energy_balance_closes_with_the_order_of_the_method(settings):
         energy = simulation.get("energy")
         assert energy[0] > 100
         return abs(energy[4])
+
     coarse, fine, finest = residual(100), residual(200), residual(400)
     assert finest < 1e-9 and np.log2(coarse / fine) > 3.4 and np.log2(fine / finest) > 3.6

@@ -11,25 +11,42 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
 import tiefmu
 from fmu_scenes import ALL_FREE, DRIVEN, MIXED, SETTINGS, scene
 from port_scenes import ported
 
 ROOT = Path(__file__).resolve().parents[1]
 SEQUENCES = int(os.environ.get("TIEFMU_SEQUENCES", 2000))
-NEVER_ALLOWED = {"fmi2" + name for name in (
-    "CancelStep", "EnterEventMode", "NewDiscreteStates", "EnterContinuousTimeMode", "CompletedIntegratorStep",
-    "SetTime", "SetContinuousStates", "GetDerivatives", "GetEventIndicators", "GetContinuousStates",
-    "GetNominalsOfContinuousStates")}
+NEVER_ALLOWED = {
+    "fmi2" + name
+    for name in (
+        "CancelStep",
+        "EnterEventMode",
+        "NewDiscreteStates",
+        "EnterContinuousTimeMode",
+        "CompletedIntegratorStep",
+        "SetTime",
+        "SetContinuousStates",
+        "GetDerivatives",
+        "GetEventIndicators",
+        "GetContinuousStates",
+        "GetNominalsOfContinuousStates",
+    )
+}
 
 
 def program(preset: str) -> Path:
     bin = Path(sys.executable).parent
-    settings = {"cwd": ROOT, "env": os.environ | {"PATH": f"{bin}{os.pathsep}{os.environ['PATH']}"},
-                "capture_output": True, "text": True}
-    for command in ([bin / "cmake", "--preset", preset, f"-DPython_EXECUTABLE={sys.executable}"],
-                    [bin / "cmake", "--build", "--preset", preset, "-j1"]):
+    settings = {
+        "cwd": ROOT,
+        "env": os.environ | {"PATH": f"{bin}{os.pathsep}{os.environ['PATH']}"},
+        "capture_output": True,
+        "text": True,
+    }
+    for command in (
+        [bin / "cmake", "--preset", preset, f"-DPython_EXECUTABLE={sys.executable}"],
+        [bin / "cmake", "--build", "--preset", preset, "-j1"],
+    ):
         done = subprocess.run(command, **settings)
         assert done.returncode == 0, done.stdout + done.stderr
     return ROOT / "build" / preset / "tiefmu_calls"
@@ -45,8 +62,13 @@ def packed(folder: Path, made: dict) -> Path:
 
 @pytest.fixture
 def folders(tmp_path) -> list[Path]:
-    return [*(packed(tmp_path / name, scene(np.random.default_rng(1), *settings))
-              for name, settings in (("mixed", MIXED), ("free", ALL_FREE), ("driven", DRIVEN))), ports(tmp_path)]
+    return [
+        *(
+            packed(tmp_path / name, scene(np.random.default_rng(1), *settings))
+            for name, settings in (("mixed", MIXED), ("free", ALL_FREE), ("driven", DRIVEN))
+        ),
+        ports(tmp_path),
+    ]
 
 
 def ports(folder: Path) -> Path:
@@ -68,8 +90,10 @@ def test_addresses_and_undefined_behaviour(folders, tmp_path):
     run(calls, "states", *folders)
     run(calls, "failures", *folders)
     run(calls, "leaks", 1000, *folders)
-    scenes = [packed(tmp_path / str(number), scene(np.random.default_rng(1), *settings))
-              for number, settings in enumerate(SETTINGS)] + [folders[-1]]
+    scenes = [
+        packed(tmp_path / str(number), scene(np.random.default_rng(1), *settings))
+        for number, settings in enumerate(SETTINGS)
+    ] + [folders[-1]]
     table = list(csv.DictReader(run(calls, "sequences", SEQUENCES, 1, *scenes).splitlines()))
     assert len(table) == 40
     for row in table:  # sequences that get nowhere would prove nothing

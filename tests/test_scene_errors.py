@@ -5,7 +5,6 @@ import os
 from pathlib import Path
 
 import pytest
-
 import tiefmu
 from conftest import toml
 from tiefmu.cli import main
@@ -38,7 +37,7 @@ def line_of(scene_file, capsys, scene) -> str:
     assert said.out == ""
     assert said.err.startswith(f"error: {name}: ") and said.err.endswith("\n") and said.err.count("\n") == 1
     assert os.listdir() == [name], "left something behind"
-    return said.err[len(f"error: {name}: "):-1]
+    return said.err[len(f"error: {name}: ") : -1]
 
 
 IDS = "expected ids (whole numbers from 1)"
@@ -49,8 +48,11 @@ CASES = {
     # unknown keys
     "unknown table": (("ties",), [], "unknown key 'ties'; did you mean 'tie'?"),
     "unknown key of a tie": (("tie", 0, "slave"), [1], "tie 'weld': unknown key 'slave'; did you mean 'slaves'?"),
-    "unknown key of a node table": (("node", 0, "motions"), "free",
-                                    "node table 1: unknown key 'motions'; did you mean 'motion'?"),
+    "unknown key of a node table": (
+        ("node", 0, "motions"),
+        "free",
+        "node table 1: unknown key 'motions'; did you mean 'motion'?",
+    ),
     "unknown key of the mesh": (("mesh", "fil"), "a.inp", "mesh: unknown key 'fil'; did you mean 'file'?"),
     "unknown key nothing like it": (("units", "force"), "N", "units: unknown key 'force'; known: length, mass, time"),
     # missing
@@ -73,150 +75,304 @@ CASES = {
     "gravity is a number": (("model", "gravity"), 9.81, "model: gravity: expected [x, y, z], found 9.81"),
     "gravity has two entries": (("model", "gravity"), [0, 0], "model: gravity: expected [x, y, z], found [0, 0]"),
     "expose is text": (("interface", "expose"), "slave.r", "interface: expose: expected a list, found 'slave.r'"),
-    "slaves is a number": (("tie", 0, "slaves"), 101,
-                           "tie 'weld': slaves: expected a list of ids, a set name or 'all', found 101"),
+    "slaves is a number": (
+        ("tie", 0, "slaves"),
+        101,
+        "tie 'weld': slaves: expected a list of ids, a set name or 'all', found 101",
+    ),
     "slave id is text": (("tie", 0, "slaves"), ["101"], f"tie 'weld': slaves: {IDS}, found '101'"),
     "slave id is a fraction": (("tie", 0, "slaves"), [101.0], f"tie 'weld': slaves: {IDS}, found 101.0"),
     "slave id is a bool": (("tie", 0, "slaves"), [True], f"tie 'weld': slaves: {IDS}, found true"),
     "slave id is too large": (("tie", 0, "slaves"), [10**30], f"tie 'weld': slaves: {IDS}, found 1{'0' * 30}"),
-    "node has two coordinates": (("mesh", "nodes", 0), [1, 0, 0],
-                                 "mesh: node 1: expected [id, x, y, z], found [1, 0, 0]"),
-    "node has four coordinates": (("mesh", "nodes", 0), [1, 0, 0, 0, 0],
-                                  "mesh: node 1: expected [id, x, y, z], found [1, 0, 0, 0, 0]"),
+    "node has two coordinates": (
+        ("mesh", "nodes", 0),
+        [1, 0, 0],
+        "mesh: node 1: expected [id, x, y, z], found [1, 0, 0]",
+    ),
+    "node has four coordinates": (
+        ("mesh", "nodes", 0),
+        [1, 0, 0, 0, 0],
+        "mesh: node 1: expected [id, x, y, z], found [1, 0, 0, 0, 0]",
+    ),
     "node is a number": (("mesh", "nodes", 0), 5, "mesh: nodes: row 1: expected [id, x, y, z], found 5"),
-    "node id is a fraction": (("mesh", "nodes", 0), [1.0, 0, 0, 0],
-                              "mesh: nodes: row 1: id: expected a whole number, found 1.0"),
-    "node id is zero": (("mesh", "nodes", 0), [0, 0, 0, 0],
-                        "mesh: nodes: row 1: id: 0 is too small; it must be at least 1"),
+    "node id is a fraction": (
+        ("mesh", "nodes", 0),
+        [1.0, 0, 0, 0],
+        "mesh: nodes: row 1: id: expected a whole number, found 1.0",
+    ),
+    "node id is zero": (
+        ("mesh", "nodes", 0),
+        [0, 0, 0, 0],
+        "mesh: nodes: row 1: id: 0 is too small; it must be at least 1",
+    ),
     "coordinate is text": (("mesh", "nodes", 0), [1, 0, "a", 0], "mesh: node 1: y: expected a number, found 'a'"),
     "coordinate is a bool": (("mesh", "nodes", 0), [1, True, 0, 0], "mesh: node 1: x: expected a number, found true"),
-    "segment of two nodes": (("mesh", "segments", 0), [1, 1, 2],
-                             "mesh: segment 1: expected [id, then three or four node ids], found [1, 1, 2]"),
-    "segment of five nodes": (("mesh", "segments", 0), [1, 1, 2, 3, 4, 101],
-                              "mesh: segment 1: expected [id, then three or four node ids], found a list of 6 values"),
-    "segment node is a fraction": (("mesh", "segments", 0), [1, 1, 2, 3.5, 4],
-                                   "mesh: segment 1: node 3: expected a whole number, found 3.5"),
+    "segment of two nodes": (
+        ("mesh", "segments", 0),
+        [1, 1, 2],
+        "mesh: segment 1: expected [id, then three or four node ids], found [1, 1, 2]",
+    ),
+    "segment of five nodes": (
+        ("mesh", "segments", 0),
+        [1, 1, 2, 3, 4, 101],
+        "mesh: segment 1: expected [id, then three or four node ids], found a list of 6 values",
+    ),
+    "segment node is a fraction": (
+        ("mesh", "segments", 0),
+        [1, 1, 2, 3.5, 4],
+        "mesh: segment 1: node 3: expected a whole number, found 3.5",
+    ),
     # choices
-    "formulation": (("tie", 0, "formulation"), "spot",
-                    "tie 'weld': formulation: 'spot' is not one of 'default', 'optimized'"),
+    "formulation": (
+        ("tie", 0, "formulation"),
+        "spot",
+        "tie 'weld': formulation: 'spot' is not one of 'default', 'optimized'",
+    ),
     "search": (("tie", 0, "search"), "nearest", "tie 'weld': search: 'nearest' is not one of 'box', 'nearest-node'"),
     "unresolved": (("tie", 0, "unresolved"), "warn", "tie 'weld': unresolved: 'warn' is not one of 'error', 'drop'"),
-    "motion": (("node", 0, "motion"), "Free",
-               "node table 1: motion: 'Free' is not one of 'driven', 'free', 'fixed'"),
+    "motion": (("node", 0, "motion"), "Free", "node table 1: motion: 'Free' is not one of 'driven', 'free', 'fixed'"),
     "inertia": (("model", "inertia"), "lump", "model: inertia: 'lump' is not one of 'lumped', 'consistent'"),
     "reaction": (("model", "reaction"), "load", "model: reaction: 'load' is not one of 'loads', 'full', 'split'"),
     "geometry": (("model", "geometry"), "large", "model: geometry: 'large' is not one of 'finite', 'small'"),
     "position": (("model", "position"), "set", "model: position: 'set' is not one of 'integrated', 'input'"),
-    "method": (("integrator", "method"), "euler", "integrator: method: 'euler' is not one of 'central-difference', "
-               "'symplectic-euler', 'noh-bathe', 'rk4'"),
-    "kind": (("spring",), [{"nodes": [1, 2], "kind": "beam"}],
-             "spring 1: kind: 'beam' is not one of 'axial', 'bushing'"),
-    "unit": (("units", "length"), "inch",
-             "units: length: 'inch' is not one of 'm', 'cm', 'mm', 'um', 'km', 'in', 'ft'"),
-    "split with lumped inertia": (("model", "reaction"), "split", "model: reaction: 'split' needs inertia = "
-                                  "'consistent' (with lumped inertia it equals 'loads')"),
+    "method": (
+        ("integrator", "method"),
+        "euler",
+        "integrator: method: 'euler' is not one of 'central-difference', 'symplectic-euler', 'noh-bathe', 'rk4'",
+    ),
+    "kind": (
+        ("spring",),
+        [{"nodes": [1, 2], "kind": "beam"}],
+        "spring 1: kind: 'beam' is not one of 'axial', 'bushing'",
+    ),
+    "unit": (
+        ("units", "length"),
+        "inch",
+        "units: length: 'inch' is not one of 'm', 'cm', 'mm', 'um', 'km', 'in', 'ft'",
+    ),
+    "split with lumped inertia": (
+        ("model", "reaction"),
+        "split",
+        "model: reaction: 'split' needs inertia = 'consistent' (with lumped inertia it equals 'loads')",
+    ),
     # ids and sets
     "slave is not in the mesh": (("tie", 0, "slaves"), [999], f"tie 'weld': slaves: node 999 {NOT_FOUND}"),
-    "segment is not in the mesh": (("tie", 0, "segments"), [7],
-                                   "tie 'weld': segments: segment 7 is not in the mesh (ids 1..1)"),
-    "segment's node is not in the mesh": (("mesh", "segments", 0), [1, 1, 2, 3, 9],
-                                          f"mesh: segment 1: node 9 {NOT_FOUND}"),
+    "segment is not in the mesh": (
+        ("tie", 0, "segments"),
+        [7],
+        "tie 'weld': segments: segment 7 is not in the mesh (ids 1..1)",
+    ),
+    "segment's node is not in the mesh": (
+        ("mesh", "segments", 0),
+        [1, 1, 2, 3, 9],
+        f"mesh: segment 1: node 9 {NOT_FOUND}",
+    ),
     "node table's node is not in the mesh": (("node", 1, "nodes"), [7], f"node table 2: nodes: node 7 {NOT_FOUND}"),
     "spring's node is not in the mesh": (("spring",), [{"nodes": [1, 99]}], f"spring 1: nodes: node 99 {NOT_FOUND}"),
-    "initial's node is not in the mesh": (("initial",), [{"nodes": [5], "v": [0, 0, 1]}],
-                                          f"initial 1: nodes: node 5 {NOT_FOUND}"),
-    "no such set": (("tie", 0, "slaves"), "top", "tie 'weld': slaves: the mesh has no set 'top'; it has no sets of "
-                    "nodes: give ids or 'all'"),
+    "initial's node is not in the mesh": (
+        ("initial",),
+        [{"nodes": [5], "v": [0, 0, 1]}],
+        f"initial 1: nodes: node 5 {NOT_FOUND}",
+    ),
+    "no such set": (
+        ("tie", 0, "slaves"),
+        "top",
+        "tie 'weld': slaves: the mesh has no set 'top'; it has no sets of nodes: give ids or 'all'",
+    ),
     "empty slaves": (("tie", 0, "slaves"), [], "tie 'weld': slaves: the list is empty; give at least one id"),
     "empty set name": (("tie", 0, "slaves"), "", "tie 'weld': slaves: the name of the set is empty"),
     "repeated node": (("mesh", "nodes", 0), [2, 0, 0, 0], "mesh: node 2 is repeated"),
     "repeated segment": (("mesh", "segments", 1), [1, 1, 2, 3], "mesh: segment 1 is repeated"),
     "repeated slave": (("tie", 0, "slaves"), [101, 101], "tie 'weld': slaves: id 101 is repeated"),
     "repeated tie": (("tie", 1), {"name": "weld", "slaves": [2]}, "tie 'weld': this name is repeated"),
-    "repeated node in a segment": (("mesh", "segments", 0), [1, 1, 2, 3, 3],
-                                   "mesh: segment 1: node 3 is repeated; a triangle has three node ids"),
+    "repeated node in a segment": (
+        ("mesh", "segments", 0),
+        [1, 1, 2, 3, 3],
+        "mesh: segment 1: node 3 is repeated; a triangle has three node ids",
+    ),
     # not finite, negative
     "coordinate is nan": (("mesh", "nodes", 0), [1, 0, 0, NAN], "mesh: node 1: z: nan is not a finite number"),
-    "coordinate is infinite": (("mesh", "nodes", 4), [101, -INF, 0, 0],
-                               "mesh: node 101: x: -inf is not a finite number"),
+    "coordinate is infinite": (
+        ("mesh", "nodes", 4),
+        [101, -INF, 0, 0],
+        "mesh: node 101: x: -inf is not a finite number",
+    ),
     "mass is infinite": (("node", 0, "mass"), INF, "node table 1: mass: inf is not a finite number"),
     "mass is negative": (("node", 0, "mass"), -1, "node table 1: mass: -1 is negative; it must be 0 or more"),
-    "inertia is negative": (("node", 1, "inertia"), -1.5,
-                            "node table 2: inertia: -1.5 is negative; it must be 0 or more"),
-    "stiffness is negative": (("node", 0, "stiffness"), -2,
-                              "node table 1: stiffness: -2 is negative; it must be 0 or more"),
-    "search distance is nan": (("tie", 0, "search_distance"), NAN,
-                               "tie 'weld': search_distance: nan is not a finite number"),
-    "search distance is negative": (("tie", 0, "search_distance"), -1,
-                                    "tie 'weld': search_distance: -1 is negative; it must be 0 or more"),
+    "inertia is negative": (
+        ("node", 1, "inertia"),
+        -1.5,
+        "node table 2: inertia: -1.5 is negative; it must be 0 or more",
+    ),
+    "stiffness is negative": (
+        ("node", 0, "stiffness"),
+        -2,
+        "node table 1: stiffness: -2 is negative; it must be 0 or more",
+    ),
+    "search distance is nan": (
+        ("tie", 0, "search_distance"),
+        NAN,
+        "tie 'weld': search_distance: nan is not a finite number",
+    ),
+    "search distance is negative": (
+        ("tie", 0, "search_distance"),
+        -1,
+        "tie 'weld': search_distance: -1 is negative; it must be 0 or more",
+    ),
     "gravity is nan": (("model", "gravity"), [0, 0, NAN], "model: gravity: nan is not a finite number"),
-    "time step is negative": (("integrator", "time_step"), -1e-3,
-                              "integrator: time_step: -0.001 is negative; it must be 0 or more"),
+    "time step is negative": (
+        ("integrator", "time_step"),
+        -1e-3,
+        "integrator: time_step: -0.001 is negative; it must be 0 or more",
+    ),
     "safety is zero": (("integrator", "safety"), 0, "integrator: safety: 0 is too small; it must be more than 0"),
     # springs
-    "spring without ends": (("spring",), [{"stiffness": 1}],
-                            "spring 1: give either nodes = [a, b] or ground = [ids], found neither"),
-    "spring with nodes and ground": (("spring",), [{"nodes": [1, 2], "ground": [1]}],
-                                     "spring 1: give either nodes = [a, b] or ground = [ids], not both"),
+    "spring without ends": (
+        ("spring",),
+        [{"stiffness": 1}],
+        "spring 1: give either nodes = [a, b] or ground = [ids], found neither",
+    ),
+    "spring with nodes and ground": (
+        ("spring",),
+        [{"nodes": [1, 2], "ground": [1]}],
+        "spring 1: give either nodes = [a, b] or ground = [ids], not both",
+    ),
     "spring of one node": (("spring",), [{"nodes": [1]}], "spring 1: nodes: expected two node ids, found [1]"),
     "spring on itself": (("spring",), [{"nodes": [1, 1]}], "spring 1: nodes: id 1 is repeated"),
-    "axial with a vector": (("spring",), [{"nodes": [1, 2], "stiffness": [1, 2, 3]}],
-                            "spring 1: stiffness: an axial spring takes one number, found [1, 2, 3]"),
-    "axial with a moment": (("spring",), [{"nodes": [1, 2], "rotational_stiffness": 1}],
-                            "spring 1: rotational_stiffness: an axial spring has none; use kind = 'bushing'"),
-    "axial to ground": (("spring",), [{"ground": [1]}], "spring 1: node 1: an axial spring to its own start position "
-                        "has no direction; use kind = \"bushing\""),
-    "bushing with two entries": (("spring",), [{"nodes": [1, 2], "kind": "bushing", "stiffness": [1, 2]}],
-                                 "spring 1: stiffness: expected a number or [x, y, z], found [1, 2]"),
-    "spring is negative": (("spring",), [{"nodes": [1, 2]}, {"nodes": [1, 3], "damping": -2}],
-                           "spring 2: damping: -2 is negative; it must be 0 or more"),
-    "bushing is nan": (("spring",), [{"ground": "all", "kind": "bushing", "stiffness": [1, 2, NAN]}],
-                       "spring 1: stiffness: nan is not a finite number"),
+    "axial with a vector": (
+        ("spring",),
+        [{"nodes": [1, 2], "stiffness": [1, 2, 3]}],
+        "spring 1: stiffness: an axial spring takes one number, found [1, 2, 3]",
+    ),
+    "axial with a moment": (
+        ("spring",),
+        [{"nodes": [1, 2], "rotational_stiffness": 1}],
+        "spring 1: rotational_stiffness: an axial spring has none; use kind = 'bushing'",
+    ),
+    "axial to ground": (
+        ("spring",),
+        [{"ground": [1]}],
+        'spring 1: node 1: an axial spring to its own start position has no direction; use kind = "bushing"',
+    ),
+    "bushing with two entries": (
+        ("spring",),
+        [{"nodes": [1, 2], "kind": "bushing", "stiffness": [1, 2]}],
+        "spring 1: stiffness: expected a number or [x, y, z], found [1, 2]",
+    ),
+    "spring is negative": (
+        ("spring",),
+        [{"nodes": [1, 2]}, {"nodes": [1, 3], "damping": -2}],
+        "spring 2: damping: -2 is negative; it must be 0 or more",
+    ),
+    "bushing is nan": (
+        ("spring",),
+        [{"ground": "all", "kind": "bushing", "stiffness": [1, 2, NAN]}],
+        "spring 1: stiffness: nan is not a finite number",
+    ),
     # who moves what
-    "slave is fixed": (("node", 1, "motion"), "fixed", "tie 'weld': slave 101: constrained twice, by the tie and by "
-                       "motion = 'fixed' in node table 2; take it out of one"),
-    "slave is a master": (("tie", 0, "slaves"), [4], "tie 'weld': slave 4: is also a master, on segment 1 of tie "
-                          "'weld'; take it out of one of them"),
-    "slave in two ties": (("tie", 1), {"name": "glue", "slaves": [101]}, "tie 'glue': slave 101: is already a slave "
-                          "of tie 'weld'; a node can follow one tie only"),
-    "slave out of reach": (("tie", 0, "search_distance"), 1e-3, "tie 'weld': slave 101: no segment found within "
-                           "search_distance 0.001 m; the nearest is segment 1 at 0.04 m"),
-    "initial velocity of a slave": (("initial",), [{"nodes": [101], "v": [0, 0, 1]}],
-                                    "initial 1: nodes: node 101 is a slave: its motion comes from its tie"),
+    "slave is fixed": (
+        ("node", 1, "motion"),
+        "fixed",
+        "tie 'weld': slave 101: constrained twice, by the tie and by "
+        "motion = 'fixed' in node table 2; take it out of one",
+    ),
+    "slave is a master": (
+        ("tie", 0, "slaves"),
+        [4],
+        "tie 'weld': slave 4: is also a master, on segment 1 of tie 'weld'; take it out of one of them",
+    ),
+    "slave in two ties": (
+        ("tie", 1),
+        {"name": "glue", "slaves": [101]},
+        "tie 'glue': slave 101: is already a slave of tie 'weld'; a node can follow one tie only",
+    ),
+    "slave out of reach": (
+        ("tie", 0, "search_distance"),
+        1e-3,
+        "tie 'weld': slave 101: no segment found within search_distance 0.001 m; the nearest is segment 1 at 0.04 m",
+    ),
+    "initial velocity of a slave": (
+        ("initial",),
+        [{"nodes": [101], "v": [0, 0, 1]}],
+        "initial 1: nodes: node 101 is a slave: its motion comes from its tie",
+    ),
     "initial of nothing": (("initial",), [{"nodes": [1]}], "initial 1: give v = [x, y, z] or w = [x, y, z]"),
-    "initial spin without rotations": (("initial",), [{"nodes": [1], "w": [0, 0, 1]}], "initial 1: w: node 1 has no "
-                                       "rotations; set rotations = true in a node table, or leave w out"),
-    "initial velocity is text": (("initial",), [{"nodes": [1], "v": [0, 0, "x"]}],
-                                 "initial 1: v: expected [x, y, z], found [0, 0, 'x']"),
+    "initial spin without rotations": (
+        ("initial",),
+        [{"nodes": [1], "w": [0, 0, 1]}],
+        "initial 1: w: node 1 has no rotations; set rotations = true in a node table, or leave w out",
+    ),
+    "initial velocity is text": (
+        ("initial",),
+        [{"nodes": [1], "v": [0, 0, "x"]}],
+        "initial 1: v: expected [x, y, z], found [0, 0, 'x']",
+    ),
     # interface
-    "expose nothing known": (("interface", "expose"), ["slave.x"], "interface: expose: unknown name 'slave.x'; known: "
-                             "energy, power_residual, drift, master.r, master.stiffness, slave.r, slave.a, "
-                             "slave.mass, slave.inertia, point.r"),
-    "port of a set that is not there": (("interface", "ports"), ["flange"], "interface: port 'flange': the mesh has no "
-                                        "set 'flange'; it has no sets of nodes: give ids or 'all'"),
-    "port of a node that is not there": (("interface", "ports"), [{"name": "a", "nodes": [7]}],
-                                         f"interface: port 'a': node 7 {NOT_FOUND}"),
-    "port without nodes": (("interface", "ports"), [{"name": "a", "nodes": []}],
-                           "interface: ports: entry 1: nodes: the list is empty; give at least one id"),
-    "port named twice": (("interface", "ports"), [{"name": "a", "nodes": [1]}, {"name": "a", "nodes": [2]}],
-                         "interface: port 'a': this name is repeated"),
-    "node in two ports": (("interface", "ports"), [{"name": "a", "nodes": [1, 2]}, {"name": "b", "nodes": [3, 2]}],
-                          "interface: port 'b': node 2: is already in port 'a'; a node can be in one port only"),
-    "port of slaves and masters": (("interface", "ports"), [{"name": "a", "nodes": [1, 101]}], "interface: port 'a': "
-                                   "holds slaves (node 101) and nodes that are none (node 1); make two ports of them"),
-    "port of all": (("interface", "ports"), ["all"], "interface: port 'all': holds slaves (node 101) and nodes that "
-                    "are none (node 4); make two ports of them"),
-    "port of a slave that cannot turn": (("interface", "ports"), [{"name": "a", "nodes": [101]}],
-                                         "interface: port 'a': its only slave cannot turn, which leaves its rotation "
-                                         "open; use formulation = \"optimized\" or rotations = true"),
-    "unknown key of a port": (("interface", "ports"), [{"name": "a", "node": [1]}],
-                              "interface: ports: entry 1: unknown key 'node'; did you mean 'nodes'?"),
+    "expose nothing known": (
+        ("interface", "expose"),
+        ["slave.x"],
+        "interface: expose: unknown name 'slave.x'; known: "
+        "energy, power_residual, drift, master.r, master.stiffness, slave.r, slave.a, "
+        "slave.mass, slave.inertia, point.r",
+    ),
+    "port of a set that is not there": (
+        ("interface", "ports"),
+        ["flange"],
+        "interface: port 'flange': the mesh has no set 'flange'; it has no sets of nodes: give ids or 'all'",
+    ),
+    "port of a node that is not there": (
+        ("interface", "ports"),
+        [{"name": "a", "nodes": [7]}],
+        f"interface: port 'a': node 7 {NOT_FOUND}",
+    ),
+    "port without nodes": (
+        ("interface", "ports"),
+        [{"name": "a", "nodes": []}],
+        "interface: ports: entry 1: nodes: the list is empty; give at least one id",
+    ),
+    "port named twice": (
+        ("interface", "ports"),
+        [{"name": "a", "nodes": [1]}, {"name": "a", "nodes": [2]}],
+        "interface: port 'a': this name is repeated",
+    ),
+    "node in two ports": (
+        ("interface", "ports"),
+        [{"name": "a", "nodes": [1, 2]}, {"name": "b", "nodes": [3, 2]}],
+        "interface: port 'b': node 2: is already in port 'a'; a node can be in one port only",
+    ),
+    "port of slaves and masters": (
+        ("interface", "ports"),
+        [{"name": "a", "nodes": [1, 101]}],
+        "interface: port 'a': holds slaves (node 101) and nodes that are none (node 1); make two ports of them",
+    ),
+    "port of all": (
+        ("interface", "ports"),
+        ["all"],
+        "interface: port 'all': holds slaves (node 101) and nodes that are none (node 4); make two ports of them",
+    ),
+    "port of a slave that cannot turn": (
+        ("interface", "ports"),
+        [{"name": "a", "nodes": [101]}],
+        "interface: port 'a': its only slave cannot turn, which leaves its rotation "
+        'open; use formulation = "optimized" or rotations = true',
+    ),
+    "unknown key of a port": (
+        ("interface", "ports"),
+        [{"name": "a", "node": [1]}],
+        "interface: ports: entry 1: unknown key 'node'; did you mean 'nodes'?",
+    ),
     "port without a name": (("interface", "ports"), [{"nodes": [1]}], "interface: ports: entry 1: name: is missing"),
-    "port with a bracket in its name": (("interface", "ports"), ["a[1]"],
-                                        "interface: ports: entry 1: 'a[1]' cannot name a port: letters, digits, spaces "
-                                        "and _ - . : / can; give the set as nodes, with another name"),
-    "port with an odd place": (("interface", "ports"), [{"name": "a", "nodes": [1], "at": [0, 0]}],
-                               "interface: ports: entry 1: at: expected [x, y, z], found [0, 0]"),
+    "port with a bracket in its name": (
+        ("interface", "ports"),
+        ["a[1]"],
+        "interface: ports: entry 1: 'a[1]' cannot name a port: letters, digits, spaces "
+        "and _ - . : / can; give the set as nodes, with another name",
+    ),
+    "port with an odd place": (
+        ("interface", "ports"),
+        [{"name": "a", "nodes": [1], "at": [0, 0]}],
+        "interface: ports: entry 1: at: expected [x, y, z], found [0, 0]",
+    ),
     "expose a number": (("interface", "expose"), [3], "interface: expose: entry 1: expected a text, found 3"),
     # mesh file
     "no such mesh file": (("mesh", "file"), "panel.inp", "mesh: file: panel.inp: no such file"),
@@ -225,65 +381,126 @@ CASES = {
 
 # ------------------------------------------------------------------------------------- every key, wrong in every way
 
+
 def one_of(*names) -> list:
     names = ", ".join(f"'{name}'" for name in names)
-    return [(value, f"{shown} is not one of {names}") for value, shown in
-            (("", "''"), ("x", "'x'"), (1, "1"), (True, "true"), ([], "[]"), ({}, "a table"))]
+    return [
+        (value, f"{shown} is not one of {names}")
+        for value, shown in (("", "''"), ("x", "'x'"), (1, "1"), (True, "true"), ([], "[]"), ({}, "a table"))
+    ]
 
 
-TEXT = [(5, "expected a text, found 5"), (True, "expected a text, found true"), (["a"], "expected a text, found ['a']"),
-        ({}, "expected a text, found a table"), ("a\x00", "holds a character that cannot be printed, U+0000"),
-        ("\u2028", "holds a character that cannot be printed, U+2028")]
+TEXT = [
+    (5, "expected a text, found 5"),
+    (True, "expected a text, found true"),
+    (["a"], "expected a text, found ['a']"),
+    ({}, "expected a text, found a table"),
+    ("a\x00", "holds a character that cannot be printed, U+0000"),
+    ("\u2028", "holds a character that cannot be printed, U+2028"),
+]
 NAME = TEXT + [("", "is empty"), ("a\nb", "holds a character that cannot be printed, U+000A")]
 FLAG = [(1, "expected true or false, found 1"), ("yes", "expected true or false, found 'yes'")]
-FINITE = [("1", "expected a number, found '1'"), (True, "expected a number, found true"),
-          ([1.0], "expected a number, found [1.0]"), ({}, "expected a number, found a table"),
-          (NAN, "nan is not a finite number"), (INF, "inf is not a finite number"),
-          (1e31, "1e+31 is too large; it must be at most 1e+30"),
-          (10**400, f"1{'0' * 36}... is too large; it must be at most 1e+30")]
+FINITE = [
+    ("1", "expected a number, found '1'"),
+    (True, "expected a number, found true"),
+    ([1.0], "expected a number, found [1.0]"),
+    ({}, "expected a number, found a table"),
+    (NAN, "nan is not a finite number"),
+    (INF, "inf is not a finite number"),
+    (1e31, "1e+31 is too large; it must be at most 1e+30"),
+    (10**400, f"1{'0' * 36}... is too large; it must be at most 1e+30"),
+]
 NUMBER = FINITE + [(-1e-3, "-0.001 is negative; it must be 0 or more")]
 POSITIVE = FINITE + [(0, "0 is too small; it must be more than 0"), (-1, "-1 is too small; it must be more than 0")]
-THREADS = [(0, "0 is too small; it must be at least 1"), (-3, "-3 is too small; it must be at least 1"),
-           (257, "257 is too large; it must be at most 256"), (10**9, "1000000000 is too large; it must be at most 256"),
-           (2.5, "expected a whole number, found 2.5"), (True, "expected a whole number, found true"),
-           ("two", "expected a whole number, found 'two'"), ([2], "expected a whole number, found [2]")]
-VECTOR = [(value, f"expected [x, y, z], found {shown}") for value, shown in
-          ((1.0, "1.0"), ("x", "'x'"), ([], "[]"), ([1, 2], "[1, 2]"), ([1, 2, 3, 4], "[1, 2, 3, 4]"),
-           ([1, 2, True], "[1, 2, true]"), ({}, "a table"))] + \
-    [([0, -INF, 0], "-inf is not a finite number"), ([0, 0, -1e40], "-1e+40 is too large; it must be at most 1e+30")]
-NUMBER_OR_VECTOR = [(value, f"expected a number or [x, y, z], found {shown}") for value, shown in
-                    (("x", "'x'"), (True, "true"), ([], "[]"), ([1, 2], "[1, 2]"), ([1, 2, "3"], "[1, 2, '3']"))] + \
-    [(-1, "-1 is negative; it must be 0 or more"), ([1, -2, 3], "-2 is negative; it must be 0 or more"),
-     (NAN, "nan is not a finite number"), ([1e50, 0, 0], "1e+50 is too large; it must be at most 1e+30")]
-NODES = [(value, f"expected a list of ids, a set name or 'all', found {shown}") for value, shown in
-         ((5, "5"), (1.5, "1.5"), (True, "true"), ({}, "a table"))] + \
-    [([], "the list is empty; give at least one id"), ("", "the name of the set is empty"),
-     ([1, 1], "id 1 is repeated"), ([999], f"node 999 {NOT_FOUND}"), ([2**63], f"{IDS}, found {2**63}"),
-     ([-1], f"{IDS}, found -1"), ([0], f"{IDS}, found 0"), (["1"], f"{IDS}, found '1'"), ([[1]], f"{IDS}, found [1]"),
-     ("a\nb", "the mesh has no set 'a\\nb'; it has no sets of nodes: give ids or 'all'")]
-SEGMENTS = [(value, line.replace("node 999", "segment 999").replace("1..101", "1..1").replace("sets of nodes",
-                                                                                          "sets of segments"))
-            for value, line in NODES]
-TABLE = [(value, f"expected a table, found {shown}") for value, shown in
-         ((5, "5"), ("x", "'x'"), (True, "true"), ([1], "[1]"))]
-LIST = [(value, f"expected a list, found {shown}") for value, shown in
-        ((5, "5"), ("x", "'x'"), (True, "true"), ({}, "a table"))]
+THREADS = [
+    (0, "0 is too small; it must be at least 1"),
+    (-3, "-3 is too small; it must be at least 1"),
+    (257, "257 is too large; it must be at most 256"),
+    (10**9, "1000000000 is too large; it must be at most 256"),
+    (2.5, "expected a whole number, found 2.5"),
+    (True, "expected a whole number, found true"),
+    ("two", "expected a whole number, found 'two'"),
+    ([2], "expected a whole number, found [2]"),
+]
+VECTOR = [
+    (value, f"expected [x, y, z], found {shown}")
+    for value, shown in (
+        (1.0, "1.0"),
+        ("x", "'x'"),
+        ([], "[]"),
+        ([1, 2], "[1, 2]"),
+        ([1, 2, 3, 4], "[1, 2, 3, 4]"),
+        ([1, 2, True], "[1, 2, true]"),
+        ({}, "a table"),
+    )
+] + [([0, -INF, 0], "-inf is not a finite number"), ([0, 0, -1e40], "-1e+40 is too large; it must be at most 1e+30")]
+NUMBER_OR_VECTOR = [
+    (value, f"expected a number or [x, y, z], found {shown}")
+    for value, shown in (("x", "'x'"), (True, "true"), ([], "[]"), ([1, 2], "[1, 2]"), ([1, 2, "3"], "[1, 2, '3']"))
+] + [
+    (-1, "-1 is negative; it must be 0 or more"),
+    ([1, -2, 3], "-2 is negative; it must be 0 or more"),
+    (NAN, "nan is not a finite number"),
+    ([1e50, 0, 0], "1e+50 is too large; it must be at most 1e+30"),
+]
+NODES = [
+    (value, f"expected a list of ids, a set name or 'all', found {shown}")
+    for value, shown in ((5, "5"), (1.5, "1.5"), (True, "true"), ({}, "a table"))
+] + [
+    ([], "the list is empty; give at least one id"),
+    ("", "the name of the set is empty"),
+    ([1, 1], "id 1 is repeated"),
+    ([999], f"node 999 {NOT_FOUND}"),
+    ([2**63], f"{IDS}, found {2**63}"),
+    ([-1], f"{IDS}, found -1"),
+    ([0], f"{IDS}, found 0"),
+    (["1"], f"{IDS}, found '1'"),
+    ([[1]], f"{IDS}, found [1]"),
+    ("a\nb", "the mesh has no set 'a\\nb'; it has no sets of nodes: give ids or 'all'"),
+]
+SEGMENTS = [
+    (
+        value,
+        line.replace("node 999", "segment 999").replace("1..101", "1..1").replace("sets of nodes", "sets of segments"),
+    )
+    for value, line in NODES
+]
+TABLE = [
+    (value, f"expected a table, found {shown}")
+    for value, shown in ((5, "5"), ("x", "'x'"), (True, "true"), ([1], "[1]"))
+]
+LIST = [
+    (value, f"expected a list, found {shown}")
+    for value, shown in ((5, "5"), ("x", "'x'"), (True, "true"), ({}, "a table"))
+]
 PORT = "expected the name of a set, or a table {name, nodes, at}"
-PORTS = LIST + [([value], f"entry 1: {line}") for value, line in (
-    (3, f"{PORT}, found 3"), (["a"], f"{PORT}, found ['a']"), (True, f"{PORT}, found true"), ({}, "name: is missing"),
-    ("", "'' cannot name a port: letters, digits, spaces and _ - . : / can; give the set as nodes, with another name"),
-    ({"name": 5}, "name: expected a text, found 5"),
-    ({"name": " a"}, "' a' cannot name a port: letters, digits, spaces and _ - . : / can"),
-    ({"name": "a\n"}, "'a\\n' cannot name a port: letters, digits, spaces and _ - . : / can"),
-    ({"name": "a", "nodes": 5}, "nodes: expected a list of ids, a set name or 'all', found 5"),
-    ({"name": "a", "nodes": [1.5]}, f"nodes: {IDS}, found 1.5"),
-    ({"name": "a", "at": [0, 0, NAN]}, "at: nan is not a finite number"))]
+PORTS = LIST + [
+    ([value], f"entry 1: {line}")
+    for value, line in (
+        (3, f"{PORT}, found 3"),
+        (["a"], f"{PORT}, found ['a']"),
+        (True, f"{PORT}, found true"),
+        ({}, "name: is missing"),
+        (
+            "",
+            "'' cannot name a port: letters, digits, spaces and _ - . : / can; give the set as nodes, with another name",
+        ),
+        ({"name": 5}, "name: expected a text, found 5"),
+        ({"name": " a"}, "' a' cannot name a port: letters, digits, spaces and _ - . : / can"),
+        ({"name": "a\n"}, "'a\\n' cannot name a port: letters, digits, spaces and _ - . : / can"),
+        ({"name": "a", "nodes": 5}, "nodes: expected a list of ids, a set name or 'all', found 5"),
+        ({"name": "a", "nodes": [1.5]}, f"nodes: {IDS}, found 1.5"),
+        ({"name": "a", "at": [0, 0, NAN]}, "at: nan is not a finite number"),
+    )
+]
 NAMES = LIST + [([3], "entry 1: expected a text, found 3"), ([["v"]], "entry 1: expected a text, found ['v']")]
 
 
 def tables(name: str) -> list:
-    return [(value, f"expected tables written [[{name}]], found {shown}") for value, shown in
-            ((5, "5"), ("x", "'x'"), ({}, "a table"))]
+    return [
+        (value, f"expected tables written [[{name}]], found {shown}")
+        for value, shown in ((5, "5"), ("x", "'x'"), ({}, "a table"))
+    ]
 
 
 KEYS = {
@@ -371,8 +588,11 @@ def test_ports_of_what_they_cannot_move(weld):
     weld["node"].append({"nodes": [3], "motion": "free"})
     weld["node"].append({"nodes": [4], "motion": "fixed"})
     weld["mesh"]["nodes"].append([9, 1.0, 0.0, 0.0])
-    for node, line in ((3, "is free; a port moves driven nodes or loads slaves"),
-                       (4, "is fixed; a port moves driven nodes or loads slaves"), (9, "no tie and no spring uses it")):
+    for node, line in (
+        (3, "is free; a port moves driven nodes or loads slaves"),
+        (4, "is fixed; a port moves driven nodes or loads slaves"),
+        (9, "no tie and no spring uses it"),
+    ):
         weld["interface"] = {"ports": [{"name": "a", "nodes": [1, node]}]}
         with pytest.raises(tiefmu.SceneError) as error:
             tiefmu.load(weld)
@@ -383,8 +603,9 @@ def test_ports_need_integrated_positions(weld):
     weld |= {"interface": {"ports": [{"name": "a", "nodes": [1]}]}, "model": {"position": "input"}}
     with pytest.raises(tiefmu.SceneError) as error:
         tiefmu.load(weld)
-    assert str(error.value) == ("scene: interface: ports: need position = 'integrated' in [model]: a port's nodes move "
-                                "with the port")
+    assert str(error.value) == (
+        "scene: interface: ports: need position = 'integrated' in [model]: a port's nodes move with the port"
+    )
 
 
 # --------------------------------------------------------------------------------------------------------------- meshes
@@ -395,42 +616,97 @@ NEEDLE = QUAD[:2] + [[3, 0.1, 1e-9, 0], [4, 0, 1e-9, 0], [101, 0.03, 0, 0.04]]
 
 # name: (nodes, segments, keys of the tie, line)
 MESHES = {
-    "bow-tie": (QUAD, [[1, 1, 3, 2, 4]], {},
-                f"tie 'weld': slave 101: no segment found within search_distance 0.122474 m; {NO_AREA}"),
-    "bow-tie, nearest node": (QUAD, [[1, 1, 2, 4, 3]], {"search": "nearest-node"},
-                              "tie 'weld': slave 101: no segment found at its nearest master node in the box of side "
-                              f"search_distance 0.122474 m; {NO_AREA}"),
-    "folded quad": (QUAD[:2] + [[3, 0.1, 0, 0], [4, 0, 0, 0]] + QUAD[4:], [[1, 1, 2, 3, 4]], {},
-                    f"tie 'weld': slave 101: no segment found within search_distance 0.0707107 m; {NO_AREA}"),
-    "collinear triangle": (QUAD[:2] + [[3, 0.2, 0, 0], [101, 0.03, 0, 0.04]], [[1, 1, 2, 3]], {},
-                           f"tie 'weld': slave 101: no segment found within search_distance 0.141421 m; {NO_AREA}"),
-    "all nodes in one place": ([[i, 1, 1, 1] for i in (1, 2, 3, 4, 101)], [[1, 1, 2, 3, 4]], {},
-                               f"tie 'weld': slave 101: no segment found within search_distance 0 m; {NO_AREA}"),
-    "needle that cannot hold a rotation": (NEEDLE, [[1, 1, 2, 3, 4]], {"formulation": "optimized"},
-                                           "tie 'weld': segment 1: cannot hold slave 101: its nodes are collinear "
-                                           "(cond(Ibar) = 5.76461e+15, at most 1e12), which leaves the rotation about "
-                                           "them open"),
-    "needle out of the box": (NEEDLE, [[1, 1, 2, 3, 4]], {"search": "nearest-node"},
-                              "tie 'weld': slave 101: no segment found at its nearest master node in the box of side "
-                              "search_distance 0.0707107 m; the nearest is segment 1 at 0.04 m"),
-    "slaves beside the masters": (QUAD[:4] + [[101, 10, 10, 0]], [[1, 1, 2, 3, 4]], {},
-                                  "tie 'weld': slave 101: no segment found within search_distance 0.1 m; it lies "
-                                  "outside every segment by more than half its size"),
-    "slaves far above the masters": (QUAD[:4] + [[101, 0.05, 0.05, 10]], [[1, 1, 2, 3, 4]], {},
-                                     "tie 'weld': slave 101: no segment found within search_distance 0.1 m; the "
-                                     "nearest is segment 1 at 10 m"),
+    "bow-tie": (
+        QUAD,
+        [[1, 1, 3, 2, 4]],
+        {},
+        f"tie 'weld': slave 101: no segment found within search_distance 0.122474 m; {NO_AREA}",
+    ),
+    "bow-tie, nearest node": (
+        QUAD,
+        [[1, 1, 2, 4, 3]],
+        {"search": "nearest-node"},
+        "tie 'weld': slave 101: no segment found at its nearest master node in the box of side "
+        f"search_distance 0.122474 m; {NO_AREA}",
+    ),
+    "folded quad": (
+        QUAD[:2] + [[3, 0.1, 0, 0], [4, 0, 0, 0]] + QUAD[4:],
+        [[1, 1, 2, 3, 4]],
+        {},
+        f"tie 'weld': slave 101: no segment found within search_distance 0.0707107 m; {NO_AREA}",
+    ),
+    "collinear triangle": (
+        QUAD[:2] + [[3, 0.2, 0, 0], [101, 0.03, 0, 0.04]],
+        [[1, 1, 2, 3]],
+        {},
+        f"tie 'weld': slave 101: no segment found within search_distance 0.141421 m; {NO_AREA}",
+    ),
+    "all nodes in one place": (
+        [[i, 1, 1, 1] for i in (1, 2, 3, 4, 101)],
+        [[1, 1, 2, 3, 4]],
+        {},
+        f"tie 'weld': slave 101: no segment found within search_distance 0 m; {NO_AREA}",
+    ),
+    "needle that cannot hold a rotation": (
+        NEEDLE,
+        [[1, 1, 2, 3, 4]],
+        {"formulation": "optimized"},
+        "tie 'weld': segment 1: cannot hold slave 101: its nodes are collinear "
+        "(cond(Ibar) = 5.76461e+15, at most 1e12), which leaves the rotation about "
+        "them open",
+    ),
+    "needle out of the box": (
+        NEEDLE,
+        [[1, 1, 2, 3, 4]],
+        {"search": "nearest-node"},
+        "tie 'weld': slave 101: no segment found at its nearest master node in the box of side "
+        "search_distance 0.0707107 m; the nearest is segment 1 at 0.04 m",
+    ),
+    "slaves beside the masters": (
+        QUAD[:4] + [[101, 10, 10, 0]],
+        [[1, 1, 2, 3, 4]],
+        {},
+        "tie 'weld': slave 101: no segment found within search_distance 0.1 m; it lies "
+        "outside every segment by more than half its size",
+    ),
+    "slaves far above the masters": (
+        QUAD[:4] + [[101, 0.05, 0.05, 10]],
+        [[1, 1, 2, 3, 4]],
+        {},
+        "tie 'weld': slave 101: no segment found within search_distance 0.1 m; the nearest is segment 1 at 10 m",
+    ),
     "repeated node": (QUAD + [[3, 1, 1, 1]], [[1, 1, 2, 3, 4]], {}, "mesh: node 3 is repeated"),
     "missing node": (QUAD[:3] + QUAD[4:], [[1, 1, 2, 3, 4]], {}, f"mesh: segment 1: node 4 {NOT_FOUND}"),
-    "node id of a segment is zero": (QUAD, [[1, 1, 2, 3, 0]], {},
-                                     "mesh: segment 1: node 4: 0 is too small; it must be at least 1"),
-    "segment id is negative": (QUAD, [[-4, 1, 2, 3, 4]], {},
-                               "mesh: segments: row 1: id: -4 is too small; it must be at least 1"),
-    "segment id is too large": (QUAD, [[2**63, 1, 2, 3, 4]], {}, "mesh: segments: row 1: id: 9223372036854775808 is "
-                                "too large; it must be at most 9.22337e+18"),
-    "node too far away": ([[1, 0, 0, 1e200]] + QUAD[1:], [[1, 1, 2, 3, 4]], {},
-                          "mesh: node 1: z: 1e+200 is too large; it must be at most 1e+30"),
-    "node too far away on the other side": ([[1, 0, -1e31, 0]] + QUAD[1:], [[1, 1, 2, 3, 4]], {},
-                                            "mesh: node 1: y: -1e+31 is too small; it must be at least -1e+30"),
+    "node id of a segment is zero": (
+        QUAD,
+        [[1, 1, 2, 3, 0]],
+        {},
+        "mesh: segment 1: node 4: 0 is too small; it must be at least 1",
+    ),
+    "segment id is negative": (
+        QUAD,
+        [[-4, 1, 2, 3, 4]],
+        {},
+        "mesh: segments: row 1: id: -4 is too small; it must be at least 1",
+    ),
+    "segment id is too large": (
+        QUAD,
+        [[2**63, 1, 2, 3, 4]],
+        {},
+        "mesh: segments: row 1: id: 9223372036854775808 is too large; it must be at most 9.22337e+18",
+    ),
+    "node too far away": (
+        [[1, 0, 0, 1e200]] + QUAD[1:],
+        [[1, 1, 2, 3, 4]],
+        {},
+        "mesh: node 1: z: 1e+200 is too large; it must be at most 1e+30",
+    ),
+    "node too far away on the other side": (
+        [[1, 0, -1e31, 0]] + QUAD[1:],
+        [[1, 1, 2, 3, 4]],
+        {},
+        "mesh: node 1: y: -1e+31 is too small; it must be at least -1e+30",
+    ),
 }
 
 
@@ -442,8 +718,9 @@ def test_mesh(name, weld, scene_file, capsys):
     assert line_of(scene_file, capsys, weld) == line
 
 
-@pytest.mark.parametrize("segments", [[[1, 4, 3, 2, 1]], [[1, 1, 2, 3, 4], [2, 4, 3, 2, 1]]],
-                         ids=["inverted", "inverted twin"])
+@pytest.mark.parametrize(
+    "segments", [[[1, 4, 3, 2, 1]], [[1, 1, 2, 3, 4], [2, 4, 3, 2, 1]]], ids=["inverted", "inverted twin"]
+)
 def test_the_sense_of_a_segment_is_free(segments, weld):
     """No broken scene: a tie has no inside, so that an inverted segment moves its slaves as the other does."""
     weld["tie"][0]["formulation"] = "optimized"
@@ -456,8 +733,10 @@ def test_the_sense_of_a_segment_is_free(segments, weld):
 
 def test_segments_without_area_are_named_where_others_hold_the_slaves(weld):
     weld["mesh"]["segments"].append([2, 1, 3, 2, 4])
-    assert "tie 'weld': segment 2: has no area (its nodes coincide, are collinear or fold onto each other); passed over" \
+    assert (
+        "tie 'weld': segment 2: has no area (its nodes coincide, are collinear or fold onto each other); passed over"
         in tiefmu.report(tiefmu.load(weld))["warnings"]
+    )
 
 
 def test_chain_of_ties(weld, scene_file, capsys):
@@ -466,40 +745,52 @@ def test_chain_of_ties(weld, scene_file, capsys):
     weld["mesh"]["segments"].append([2, 101, 102, 103])
     weld["tie"][0]["segments"] = [1]
     weld["tie"].append({"name": "glue", "segments": [2], "slaves": [104]})
-    assert line_of(scene_file, capsys, weld) == \
-        "tie 'weld': slave 101: is also a master, on segment 2 of tie 'glue'; take it out of one of them"
+    assert (
+        line_of(scene_file, capsys, weld)
+        == "tie 'weld': slave 101: is also a master, on segment 2 of tie 'glue'; take it out of one of them"
+    )
     weld["tie"][1]["slaves"] = [4]
     weld["tie"][0]["slaves"] = [103]
-    assert line_of(scene_file, capsys, weld) == \
-        "tie 'glue': slave 4: is also a master, on segment 1 of tie 'weld'; take it out of one of them"
+    assert (
+        line_of(scene_file, capsys, weld)
+        == "tie 'glue': slave 4: is also a master, on segment 1 of tie 'weld'; take it out of one of them"
+    )
 
 
 def test_slaves_are_masters_too(weld, scene_file, capsys):
     weld["tie"][0]["slaves"] = "all"
-    assert line_of(scene_file, capsys, weld) == \
-        "tie 'weld': slave 1: is also a master, on segment 1 of tie 'weld'; take it out of one of them"
+    assert (
+        line_of(scene_file, capsys, weld)
+        == "tie 'weld': slave 1: is also a master, on segment 1 of tie 'weld'; take it out of one of them"
+    )
 
 
 def test_free_node_that_turns_without_inertia(weld, scene_file, capsys):
     weld["mesh"]["nodes"].append([5, 1, 1, 1])
     weld["node"].append({"nodes": [5], "motion": "free", "rotations": True, "mass": 1.0})
     weld["spring"] = [{"ground": [5], "kind": "bushing", "stiffness": 1.0}]
-    assert line_of(scene_file, capsys, weld) == "node 5: is free but has no inertia of its own and gets none from its " \
+    assert (
+        line_of(scene_file, capsys, weld) == "node 5: is free but has no inertia of its own and gets none from its "
         "slaves; give it inertia, or rotations = false"
+    )
 
 
 def test_spring_on_free_node_without_mass(weld, scene_file, capsys):
     weld["mesh"]["nodes"].append([5, 1, 1, 1])
     weld["node"].append({"nodes": [5], "motion": "free", "mass": 0.0})
     weld["spring"] = [{"nodes": [5, 101], "stiffness": 1.0}]
-    assert line_of(scene_file, capsys, weld) == \
-        "node 5: is free but has no mass of its own and gets none from its slaves; give it mass"
+    assert (
+        line_of(scene_file, capsys, weld)
+        == "node 5: is free but has no mass of its own and gets none from its slaves; give it mass"
+    )
 
 
 def test_torsion_on_what_cannot_turn(weld, scene_file, capsys):
     weld["spring"] = [{"nodes": [101, 1], "kind": "bushing", "rotational_stiffness": 1.0}]
-    assert line_of(scene_file, capsys, weld) == "spring 1: slave 101 cannot take a moment: the nodes of segment 1 of " \
+    assert (
+        line_of(scene_file, capsys, weld) == "spring 1: slave 101 cannot take a moment: the nodes of segment 1 of "
         "tie 'weld' have no rotations; use formulation = \"optimized\""
+    )
 
 
 @pytest.mark.parametrize("number", [2**63, 2**64, 10**30])
@@ -509,8 +800,9 @@ def test_ids_of_a_gmsh_file_that_are_too_large(number, weld, scene_file, tmp_pat
     weld["mesh"] = {"file": "panel.msh"}
     with pytest.raises(tiefmu.SceneError) as error:
         tiefmu.load(scene_file(weld))
-    assert str(error.value) == ("weld.toml: mesh: file: panel.msh: "
-                                f"segment {number}: ids are less than 9223372036854775808")
+    assert str(error.value) == (
+        f"weld.toml: mesh: file: panel.msh: segment {number}: ids are less than 9223372036854775808"
+    )
 
 
 @pytest.mark.parametrize("file, line", [("..", "no such file"), ("a" * 300, "File name too long")])
@@ -549,36 +841,46 @@ def test_fixed_node_with_initial_velocity(weld, scene_file, capsys):
 
 def test_initial_spin_of_all_where_nothing_turns(weld, scene_file, capsys):
     weld["initial"] = [{"nodes": "all", "w": [0, 0, 1]}]
-    assert line_of(scene_file, capsys, weld) == \
-        "initial 1: w: no node has rotations; set rotations = true in a node table, or leave w out"
+    assert (
+        line_of(scene_file, capsys, weld)
+        == "initial 1: w: no node has rotations; set rotations = true in a node table, or leave w out"
+    )
 
 
 def test_coincident_ends_of_an_axial_spring(weld, scene_file, capsys):
     weld["mesh"]["nodes"].append([5, 0, 0, 0])
     weld["spring"] = [{"nodes": [1, 5], "stiffness": 1.0}]
-    assert line_of(scene_file, capsys, weld) == \
-        "spring 1: nodes 1 and 5 are at the same place; an axial spring needs two distinct positions"
+    assert (
+        line_of(scene_file, capsys, weld)
+        == "spring 1: nodes 1 and 5 are at the same place; an axial spring needs two distinct positions"
+    )
 
 
 def test_free_node_without_mass(weld, scene_file, capsys):
     weld["node"] = [{"nodes": "all", "motion": "free"}]
-    assert line_of(scene_file, capsys, weld) == \
-        "node 1: is free but has no mass of its own and gets none from its slaves; give it mass"
+    assert (
+        line_of(scene_file, capsys, weld)
+        == "node 1: is free but has no mass of its own and gets none from its slaves; give it mass"
+    )
 
 
 def test_slave_with_inertia_that_no_master_can_carry(weld, scene_file, capsys):
     weld["node"][1]["inertia"] = 0.1
-    assert line_of(scene_file, capsys, weld) == \
-        "tie 'weld': slave 101: has rotary inertia, but the nodes of segment 1 have no rotations to carry it; " \
-        "use formulation = \"optimized\" or rotations = true"
+    assert (
+        line_of(scene_file, capsys, weld)
+        == "tie 'weld': slave 101: has rotary inertia, but the nodes of segment 1 have no rotations to carry it; "
+        'use formulation = "optimized" or rotations = true'
+    )
 
 
 def test_optimized_tie_on_collinear_nodes(weld, scene_file, capsys):
     weld["mesh"]["nodes"][:4] = [[1, 0, 0, 0], [2, 0.1, 0, 0], [3, 0.2, 0, 0], [4, 0.3, 0, 0]]
     weld["tie"][0]["formulation"] = "optimized"
-    assert line_of(scene_file, capsys, weld) == \
-        "tie 'weld': slave 101: no segment found within search_distance 0.173205 m; it lies outside every segment by " \
+    assert (
+        line_of(scene_file, capsys, weld)
+        == "tie 'weld': slave 101: no segment found within search_distance 0.173205 m; it lies outside every segment by "
         "more than half its size; without area and passed over: segment 1"
+    )
 
 
 def test_no_such_file(tmp_path, monkeypatch, capsys):
@@ -594,18 +896,21 @@ def test_folder_in_place_of_a_file(tmp_path, monkeypatch, capsys):
     assert capsys.readouterr().err == "error: weld.toml: Is a directory\n"
 
 
-@pytest.mark.parametrize("text, line", [
-    ("title = \"a\"\nmesh = {\n", "line 2, column 9: not TOML: "),
-    ("title = \"a\n", "line 1, column 11: not TOML: "),
-    ("title = 'a'\ntitle = 'b'\n", "line 2, column 12: not TOML: Cannot overwrite a value"),
-    ("a = [1, 2", "end of file: not TOML: "),
-])
+@pytest.mark.parametrize(
+    "text, line",
+    [
+        ('title = "a"\nmesh = {\n', "line 2, column 9: not TOML: "),
+        ('title = "a\n', "line 1, column 11: not TOML: "),
+        ("title = 'a'\ntitle = 'b'\n", "line 2, column 12: not TOML: Cannot overwrite a value"),
+        ("a = [1, 2", "end of file: not TOML: "),
+    ],
+)
 def test_not_toml(scene_file, capsys, text, line):
     assert line_of(scene_file, capsys, text).startswith(line)
 
 
 def test_not_text(tmp_path, scene_file, capsys):
-    (tmp_path / "weld.toml").write_bytes(b"title = \"\xff\xfe\"")
+    (tmp_path / "weld.toml").write_bytes(b'title = "\xff\xfe"')
     assert main(["build", "weld.toml"]) == 2
     assert capsys.readouterr().err == "error: weld.toml: not a text file (byte 9 is not UTF-8)\n"
 

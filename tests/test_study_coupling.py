@@ -7,11 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
-
 import tiefmu
 from conftest import toml
 from independent import Problem
+from scipy.integrate import solve_ivp
 from tiefmu.study import coupling
 from tiefmu.study.hosts import Coupling, InProcess, Packaged
 
@@ -28,13 +27,21 @@ def study(folder: Path, *arguments) -> list[dict]:
     [file] = folder.glob("coupling_*.csv")
     with open(file, newline="") as text:
         rows = list(csv.DictReader(text))
-    return [{key: value if key in ("scene", "host", "reaction", "extrapolation", "status") else float(value)
-             for key, value in row.items()} for row in rows]
+    return [
+        {
+            key: value if key in ("scene", "host", "reaction", "extrapolation", "status") else float(value)
+            for key, value in row.items()
+        }
+        for row in rows
+    ]
 
 
 def of(rows, reaction, extrapolation, status=None):
-    return [row for row in rows if (row["reaction"], row["extrapolation"]) == (reaction, extrapolation)
-            and status in (None, row["status"])]
+    return [
+        row
+        for row in rows
+        if (row["reaction"], row["extrapolation"]) == (reaction, extrapolation) and status in (None, row["status"])
+    ]
 
 
 @pytest.fixture(scope="module")
@@ -98,8 +105,10 @@ def test_study_repeats_and_writes_everything(spotweld, tmp_path):
         for key in coupling.TIMES:
             del a[key], b[key]
         assert repr(a) == repr(b)
-    assert {path.name for path in tmp_path.iterdir()} == {"coupling.html", *(f"coupling_spotweld.{kind}"
-                                                                             for kind in ("csv", "png", "svg"))}
+    assert {path.name for path in tmp_path.iterdir()} == {
+        "coupling.html",
+        *(f"coupling_spotweld.{kind}" for kind in ("csv", "png", "svg")),
+    }
     page = (tmp_path / "coupling.html").read_text()
     assert "<svg" in page and "spring-damper" in page and "src=" not in page
 
@@ -113,11 +122,18 @@ def test_exact_host(mass, stiffness):
 
     class Still:
         pass
+
     state = np.array([[u], [v], [0.0], [loads[1]], [loads[2]]])
     after, end = Coupling(Still(), host, step, 2).advance(state, np.array([loads[0]]))
     force = np.polynomial.Polynomial(np.polynomial.polynomial.polyfit([0, -step, -2 * step], loads, 2))
-    exact = solve_ivp(lambda t, y: [y[1], (force(t) - host.stiffness[0] * y[0] - host.damping[0] * y[1]) / 2.0],
-                      (0, step), [u, v], method="DOP853", rtol=1e-13, atol=1e-14).y[:, -1]
+    exact = solve_ivp(
+        lambda t, y: [y[1], (force(t) - host.stiffness[0] * y[0] - host.damping[0] * y[1]) / 2.0],
+        (0, step),
+        [u, v],
+        method="DOP853",
+        rtol=1e-13,
+        atol=1e-14,
+    ).y[:, -1]
     np.testing.assert_allclose(after[:2, 0], exact, rtol=1e-11)
     np.testing.assert_allclose(end, force(step), rtol=1e-12)
     np.testing.assert_allclose([after[3, 0], after[4, 0]], loads[:2])
@@ -149,8 +165,10 @@ def test_fmu_gives_the_bits_of_the_solver():
         scene = one.scene(reaction)
         with Packaged(scene) as packaged:
             inside = InProcess(scene)
-            runs = [one.simulate(tie, one.masses(reaction, tie.added), one.window / 40, 0, 40)
-                    for tie in (packaged, inside, packaged)]
+            runs = [
+                one.simulate(tie, one.masses(reaction, tie.added), one.window / 40, 0, 40)
+                for tie in (packaged, inside, packaged)
+            ]
         for velocity, load, residual, _ in runs[1:]:
             np.testing.assert_array_equal(velocity, runs[0][0])
             np.testing.assert_array_equal(load, runs[0][1])
@@ -170,11 +188,17 @@ def test_rigid_host_and_mass_ratio():
 
 def test_scenes_it_cannot_do(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    quad = {"mesh": {"nodes": [[1, 0, 0, 0], [2, 1, 0, 0], [3, 1, 1, 0], [4, 0, 1, 0], [5, 0.5, 0.5, 0]],
-                     "segments": [[1, 1, 2, 3, 4]]},
-            "tie": [{"segments": "all", "slaves": [5]}]}
-    for name, node, words in (("free", {"nodes": "all", "motion": "free", "mass": 1.0}, "no driven masters"),
-                              ("light", {"nodes": [5], "mass": 1.0}, "no mass")):
+    quad = {
+        "mesh": {
+            "nodes": [[1, 0, 0, 0], [2, 1, 0, 0], [3, 1, 1, 0], [4, 0, 1, 0], [5, 0.5, 0.5, 0]],
+            "segments": [[1, 1, 2, 3, 4]],
+        },
+        "tie": [{"segments": "all", "slaves": [5]}],
+    }
+    for name, node, words in (
+        ("free", {"nodes": "all", "motion": "free", "mass": 1.0}, "no driven masters"),
+        ("light", {"nodes": [5], "mass": 1.0}, "no mass"),
+    ):
         Path(f"{name}.toml").write_text(toml(quad | {"node": [node]}))
         with pytest.raises(tiefmu.SceneError, match=words) as caught:
             coupling.Study(f"{name}.toml")

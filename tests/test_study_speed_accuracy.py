@@ -7,10 +7,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
-
 from conftest import toml
 from independent import Problem
+from scipy.integrate import solve_ivp
 from tiefmu import SceneError
 from tiefmu.cli import main
 from tiefmu.study import motion, reference, speed_accuracy
@@ -20,8 +19,10 @@ from tiefmu.study.variants import METHODS, Source, Variant
 
 # One free quad on ground springs, a heavy slave off its plane, nothing that damps.
 FREE = {
-    "mesh": {"nodes": [[1, 0, 0, 0], [2, 0.1, 0, 0], [3, 0.1, 0.1, 0], [4, 0, 0.1, 0.01], [101, 0.03, 0.06, 0.04]],
-             "segments": [[1, 1, 2, 3, 4]]},
+    "mesh": {
+        "nodes": [[1, 0, 0, 0], [2, 0.1, 0, 0], [3, 0.1, 0.1, 0], [4, 0, 0.1, 0.01], [101, 0.03, 0.06, 0.04]],
+        "segments": [[1, 1, 2, 3, 4]],
+    },
     "node": [{"nodes": "all", "motion": "free", "mass": 1.0}, {"nodes": [101], "mass": 0.7}],
     "tie": [{"segments": "all", "slaves": [101], "formulation": "optimized"}],
     "spring": [{"ground": [1, 2, 3, 4], "kind": "bushing", "stiffness": [2e4, 3e4, 4e4]}],
@@ -30,8 +31,10 @@ FREE = {
 }
 DRIVEN = {
     "mesh": FREE["mesh"],
-    "node": [{"nodes": "all", "mass": 1.0, "rotations": True, "inertia": 1e-3},
-             {"nodes": [101], "mass": 0.7, "inertia": 2e-4}],
+    "node": [
+        {"nodes": "all", "mass": 1.0, "rotations": True, "inertia": 1e-3},
+        {"nodes": [101], "mass": 0.7, "inertia": 2e-4},
+    ],
     "tie": [{"segments": "all", "slaves": [101]}],
     "model": {"gravity": [0, 0, -9.81]},
 }
@@ -52,8 +55,9 @@ def folder(tmp_path_factory):
 def free(folder) -> Path:
     """A small study of the free scene; the path of its CSV."""
     (folder / "free.toml").write_text(toml(FREE))
-    assert main(["study", "speed-accuracy", str(folder / "free.toml"), "--out", str(folder / "out"),
-                 "--ladder", "8"]) == 0
+    assert (
+        main(["study", "speed-accuracy", str(folder / "free.toml"), "--out", str(folder / "out"), "--ladder", "8"]) == 0
+    )
     return folder / "out" / "speed-accuracy-free.csv"
 
 
@@ -64,12 +68,17 @@ def driven(folder) -> Path:
     t = np.linspace(0, 0.5, 2001)
     columns = {"time": t, "slave[1].f[1]": 3 * np.sin(9 * t)}
     for i in (1, 2, 3, 4):
-        columns |= {f"master[{i}].v[3]": np.sin(7 * t + i), f"master[{i}].w[1]": 4 * np.cos(5 * t),
-                    f"master[{i}].w[2]": 3 * np.sin(3 * t + i)}
+        columns |= {
+            f"master[{i}].v[3]": np.sin(7 * t + i),
+            f"master[{i}].w[1]": 4 * np.cos(5 * t),
+            f"master[{i}].w[2]": 3 * np.sin(3 * t + i),
+        }
     rows = [",".join(columns), *(",".join(map(repr, row)) for row in np.array(list(columns.values())).T.tolist())]
     (folder / "driven.csv").write_text("\n".join(rows) + "\n")
-    assert main(["study", "speed-accuracy", str(folder / "driven.toml"), "--out", str(folder / "out"),
-                 "--ladder", "5"]) == 0
+    assert (
+        main(["study", "speed-accuracy", str(folder / "driven.toml"), "--out", str(folder / "out"), "--ladder", "5"])
+        == 0
+    )
     return folder / "out" / "speed-accuracy-driven.csv"
 
 
@@ -123,11 +132,13 @@ def test_every_curve_of_a_driven_scene_falls_with_its_order(driven):
 
 def test_model_error_is_what_total_error_ends_in(free):
     """Lumping: total error of the finest run = model error, which its own discretisation error is far below."""
-    rows = [row for row in records(free) if row["inertia"] == "lumped" and row["method"] == "rk4"
-            and row["status"] == "ok"]
+    rows = [
+        row for row in records(free) if row["inertia"] == "lumped" and row["method"] == "rk4" and row["status"] == "ok"
+    ]
     for key in {(row["formulation"], row["geometry"]) for row in rows}:
-        finest = min((row for row in rows if (row["formulation"], row["geometry"]) == key),
-                     key=lambda row: float(row["step"]))
+        finest = min(
+            (row for row in rows if (row["formulation"], row["geometry"]) == key), key=lambda row: float(row["step"])
+        )
         assert float(finest["error_v"]) == pytest.approx(float(finest["model_v"]), rel=1e-3)
         assert float(finest["discretisation_v"]) < 1e-3 * float(finest["model_v"])
 
@@ -160,6 +171,7 @@ def test_the_csv_reads_back(free):
 
 # ---- the reference against SciPy
 
+
 def test_reference_of_a_free_scene_is_dop853_of_the_independent_equations(folder, free):
     source = Source(folder / "free.toml")
     signals = Signals.read(source.scene, None)
@@ -191,15 +203,17 @@ def test_reference_of_a_driven_scene_is_its_inverse_dynamics(folder, driven):
     for sample, t in enumerate(np.linspace(0, 0.5, 41)[1:]):
         knots = np.concatenate([[last], rows[(rows > last + 1e-9) & (rows < t - 1e-9)], [t]])
         for a, b in zip(knots[:-1], knots[1:]):  # smooth between the kinks of the input
-            d = solve_ivp(lambda s, x: np.cross(spin(s), x), (a, b), d, method="DOP853", rtol=1e-13,
-                          atol=1e-16).y[:, -1]
+            d = solve_ivp(lambda s, x: np.cross(spin(s), x), (a, b), d, method="DOP853", rtol=1e-13, atol=1e-16).y[
+                :, -1
+            ]
         last = t
         w = spin(t)
         v = sum(p * signals.at((i, "v"), t) for p, i in zip(phi, (1, 2, 3, 4)))
         assert ours.v[sample, 0] == pytest.approx(v + np.cross(w, d), abs=1e-10)
         before = t - 1e-6  # slopes of the interval that ends here
-        slope = lambda kind: sum(p * (signals.at((i, kind), t) - signals.at((i, kind), before)) / 1e-6
-                                 for p, i in zip(phi, (1, 2, 3, 4)))
+        slope = lambda kind: sum(
+            p * (signals.at((i, kind), t) - signals.at((i, kind), before)) / 1e-6 for p, i in zip(phi, (1, 2, 3, 4))
+        )
         a_s = slope("v") + np.cross(slope("w"), d) + np.cross(w, np.cross(w, d))
         load = signals.at((101, "f"), t) - 0.7 * (a_s - [0, 0, -9.81])
         assert ours.f[sample] == pytest.approx(np.outer(phi, load), abs=1e-6)
@@ -208,12 +222,15 @@ def test_reference_of_a_driven_scene_is_its_inverse_dynamics(folder, driven):
 def test_full_and_split_with_what_the_host_carries_are_the_same_load(folder, driven):
     source = Source(folder / "driven.toml")
     signals = Signals.read(source.scene, folder / "driven.csv")
-    runs = [DrivenRun(source.build(Variant(), reaction=reaction), signals, reaction, "held input").trajectory(2)
-            for reaction in ("full", "split")]
+    runs = [
+        DrivenRun(source.build(Variant(), reaction=reaction), signals, reaction, "held input").trajectory(2)
+        for reaction in ("full", "split")
+    ]
     assert runs[0].difference(runs[1])[1] < 1e-13
 
 
 # ---- page, interruption, bad input
+
 
 def test_the_page_stands_alone(free, driven):
     text = (free.parent / "speed-accuracy.html").read_text()
@@ -246,9 +263,11 @@ def test_bad_input_is_one_line(folder, capsys, driven):
     unsprung = FREE | {"spring": []}
     (folder / "unsprung.toml").write_text(toml({key: item for key, item in unsprung.items() if item != []}))
     (folder / "unmoved.toml").write_text(toml(DRIVEN))
-    for scene, said in [("nosuch.toml", "nosuch.toml: no such file"),
-                        ("unsprung.toml", "unsprung.toml: no free node is held by a spring"),
-                        ("unmoved.toml", "unmoved.toml: every master is driven and there is no input")]:
+    for scene, said in [
+        ("nosuch.toml", "nosuch.toml: no such file"),
+        ("unsprung.toml", "unsprung.toml: no free node is held by a spring"),
+        ("unmoved.toml", "unmoved.toml: every master is driven and there is no input"),
+    ]:
         assert main(["study", "speed-accuracy", str(folder / scene), "--out", str(folder / "bad")]) == 2
         error = capsys.readouterr().err
         assert said in error and error.startswith("error: ") and error.count("\n") == 1

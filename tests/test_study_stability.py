@@ -6,7 +6,6 @@ import math
 
 import numpy as np
 import pytest
-
 from tiefmu.study import limits, stability, stability_cases, stability_map
 
 LIMITS = stability_cases.limits()
@@ -17,8 +16,11 @@ def test_every_item_is_there():
     assert {row.item for row in LIMITS + VALUES} == set(stability_cases.ITEMS) == set("12345678")
 
 
-@pytest.mark.parametrize("limit, way", [(limit, way) for limit in LIMITS for way in limit.tests()],
-                         ids=lambda value: value if isinstance(value, str) else f"{value.item}: {value.case}")
+@pytest.mark.parametrize(
+    "limit, way",
+    [(limit, way) for limit in LIMITS for way in limit.tests()],
+    ids=lambda value: value if isinstance(value, str) else f"{value.item}: {value.case}",
+)
 def test_limit_is_bracketed(limit, way):
     fails = limit.tests()[way]
     assert not fails(0.98 * limit.closed)
@@ -116,12 +118,18 @@ def test_study_writes_everything_and_repeats(tmp_path, capsys, monkeypatch):
         stability.add_parser(options.add_subparsers())
         options = options.parse_args(["stability", "--out", str(tmp_path / name), "--grid", "4"])
         assert options.command(options) == 0
-        written.append({path.name: path.read_bytes() for path in (tmp_path / name).iterdir()
-                        if path.suffix in (".csv", ".html")})
+        written.append(
+            {path.name: path.read_bytes() for path in (tmp_path / name).iterdir() if path.suffix in (".csv", ".html")}
+        )
     assert written[0] == written[1]
     names = {path.name for path in (tmp_path / "a").iterdir()}
-    assert names == {"stability_limits.csv", "stability_values.csv", "stability_map.csv", "stability.html",
-                     *(f"stability_{chart}.{kind}" for chart in ("limits", "map") for kind in ("png", "svg"))}
+    assert names == {
+        "stability_limits.csv",
+        "stability_values.csv",
+        "stability_map.csv",
+        "stability.html",
+        *(f"stability_{chart}.{kind}" for chart in ("limits", "map") for kind in ("png", "svg")),
+    }
     rows = list(csv.DictReader(written[0]["stability_limits.csv"].decode().splitlines()))
     assert len(rows) == len(some) and {row["status"] for row in rows} == {"ok"}
     assert "8. outside the segment" in capsys.readouterr().out

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-
 import tiefmu
 from fmu_calls import ERROR, OK, Fmu, Instance
 from in_process import Run
@@ -35,6 +34,7 @@ def test_optimized_without_rotational_freedom_is_optimized():
         run = Run(one_quad(formulation=formulation))
         run.set_of(5, "f", force)
         return np.array([run.of(i, "f") for i in (1, 2, 3, 4)])
+
     r = QUAD - QUAD.mean(axis=0)
     d = np.array([0.3, 0.6, 0.4]) - QUAD.mean(axis=0)
     ibar = sum(x @ x * np.eye(3) - np.outer(x, x) for x in r)
@@ -76,10 +76,14 @@ def rivet_outside():
     """A bushing between slaves that lie outside their segments."""
     lower, upper = QUAD, QUAD + [0, 0, 1]
     return {
-        "mesh": {"nodes": rows(1, lower) + rows(11, upper) + [[5, 1.2, 1.2, 0.3], [15, 1.2, 1.2, 0.8]],
-                 "segments": [[1, 1, 2, 3, 4], [2, 11, 12, 13, 14]]},
-        "node": [{"nodes": "all", "motion": "free", "rotations": True, "mass": 0.1, "inertia": 0.01},
-                 {"nodes": [5, 15], "mass": 1.0, "inertia": 0.1}],
+        "mesh": {
+            "nodes": rows(1, lower) + rows(11, upper) + [[5, 1.2, 1.2, 0.3], [15, 1.2, 1.2, 0.8]],
+            "segments": [[1, 1, 2, 3, 4], [2, 11, 12, 13, 14]],
+        },
+        "node": [
+            {"nodes": "all", "motion": "free", "rotations": True, "mass": 0.1, "inertia": 0.01},
+            {"nodes": [5, 15], "mass": 1.0, "inertia": 0.1},
+        ],
         "tie": [{"name": "a", "segments": [1], "slaves": [5]}, {"name": "b", "segments": [2], "slaves": [15]}],
         "spring": [{"nodes": [5, 15], "kind": "bushing", "stiffness": 1e5, "rotational_stiffness": 1e4}],
         "initial": [{"nodes": [1, 2], "v": [0.01, 0, 0.01]}],
@@ -125,6 +129,7 @@ def test_offset_of_a_spinning_optimized_tie_is_constant():
         turn = np.array([[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]])
         for i, x in enumerate(QUAD @ turn.T, start=1):
             run.set({f"master[{i}].r": x, f"master[{i}].v": np.cross(spin, x)})
+
     for k in range(1000):  # ten revolutions
         move(2 * np.pi * k * size)
         run.step(size)
@@ -138,9 +143,10 @@ def test_offset_of_a_spinning_optimized_tie_is_constant():
 def test_segment_of_zero_area_never_wins():
     corners = np.vstack([QUAD, [0.3, 0.6, 0.39]])  # the slave sits on a segment of no area
     scene = one_quad(slave=(0.3, 0.6, 0.4))
-    scene["mesh"] = {"nodes": rows(1, QUAD) + [[5, 0.3, 0.6, 0.4], [6, 0.3, 0.6, 0.4], [7, 0.4, 0.6, 0.4],
-                                               [8, 0.5, 0.6, 0.4]],
-                     "segments": [[1, 1, 2, 3, 4], [9, 6, 7, 8]]}
+    scene["mesh"] = {
+        "nodes": rows(1, QUAD) + [[5, 0.3, 0.6, 0.4], [6, 0.3, 0.6, 0.4], [7, 0.4, 0.6, 0.4], [8, 0.5, 0.6, 0.4]],
+        "segments": [[1, 1, 2, 3, 4], [9, 6, 7, 8]],
+    }
     assert no_area(np.array([[0.3, 0.6, 0.4], [0.4, 0.6, 0.4], [0.5, 0.6, 0.4]])) and not no_area(corners[:4])
     found = tiefmu.report(tiefmu.load(scene))
     assert found["slaves"][0]["segment"] == 1 and found["slaves"][0]["distance"] == pytest.approx(0.4)

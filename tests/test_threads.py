@@ -6,7 +6,6 @@ from pathlib import Path
 import fmpy
 import numpy as np
 import pytest
-
 import tiefmu
 from fmu_scenes import SETTINGS, scene
 from tiefmu._core import kernels
@@ -26,18 +25,38 @@ def panel(formulation: str, rotations: bool, motion: str, side: int = 64, shuffl
     if shuffled:
         rng.shuffle(ids)
         rng.shuffle(quads)
-    slave_ids = ids[len(x):]
+    slave_ids = ids[len(x) :]
     return {
-        "mesh": {"nodes": [[int(k), *map(float, p)] for k, p in zip(ids, places)],
-                 "segments": [[e + 1, *map(int, ids[q])] for e, q in enumerate(quads)]},
-        "node": [{"nodes": [int(k) for k in ids[:len(x)]], "motion": motion, "rotations": rotations, "mass": 1.0,
-                  "inertia": 0.1},
-                 {"nodes": [int(k) for k in slave_ids], "mass": 0.3,
-                  "inertia": 0.02 if rotations or formulation == "optimized" else 0.0}],
-        "tie": [{"name": "panel", "segments": "all", "slaves": [int(k) for k in slave_ids], "formulation": formulation,
-                 "search_distance": 1.5}],
-        "initial": [{"nodes": [int(k)], "v": [float(a) for a in start.normal(size=3)]} for k in ids[:min(20, len(x))]] if motion == "free"
-                   else [],
+        "mesh": {
+            "nodes": [[int(k), *map(float, p)] for k, p in zip(ids, places)],
+            "segments": [[e + 1, *map(int, ids[q])] for e, q in enumerate(quads)],
+        },
+        "node": [
+            {
+                "nodes": [int(k) for k in ids[: len(x)]],
+                "motion": motion,
+                "rotations": rotations,
+                "mass": 1.0,
+                "inertia": 0.1,
+            },
+            {
+                "nodes": [int(k) for k in slave_ids],
+                "mass": 0.3,
+                "inertia": 0.02 if rotations or formulation == "optimized" else 0.0,
+            },
+        ],
+        "tie": [
+            {
+                "name": "panel",
+                "segments": "all",
+                "slaves": [int(k) for k in slave_ids],
+                "formulation": formulation,
+                "search_distance": 1.5,
+            }
+        ],
+        "initial": [{"nodes": [int(k)], "v": [float(a) for a in start.normal(size=3)]} for k in ids[: min(20, len(x))]]
+        if motion == "free"
+        else [],
         **tables,
     }
 
@@ -54,14 +73,22 @@ def trajectory(tables: dict) -> np.ndarray:
     for _ in range(5):
         simulation.step(0.01)
         simulation.update_outputs()
-        values += [simulation.get(name).ravel() for name in ("slave_velocity", "reaction_force", "velocity", "position")
-                   if name in simulation.fields]
+        values += [
+            simulation.get(name).ravel()
+            for name in ("slave_velocity", "reaction_force", "velocity", "position")
+            if name in simulation.fields
+        ]
     assert np.abs(values[0]).max() > 0
     return np.concatenate(values)
 
 
-CASES = [("default", False, "free"), ("default", True, "free"), ("optimized", False, "free"), ("optimized", False, "driven"),
-         ("default", True, "driven")]
+CASES = [
+    ("default", False, "free"),
+    ("default", True, "free"),
+    ("optimized", False, "free"),
+    ("optimized", False, "driven"),
+    ("default", True, "driven"),
+]
 
 
 @pytest.mark.parametrize("formulation, rotations, motion", CASES)
@@ -71,8 +98,15 @@ def test_threads_do_not_change_a_bit(formulation, rotations, motion):
         assert np.array_equal(first, trajectory(panel(formulation, rotations, motion, integrator={"threads": threads})))
 
 
-@pytest.mark.parametrize("tables", [{"model": {"inertia": "consistent"}}, {"integrator": {"method": "rk4"}},
-                                    {"integrator": {"method": "noh-bathe"}}, {"model": {"geometry": "small"}}])
+@pytest.mark.parametrize(
+    "tables",
+    [
+        {"model": {"inertia": "consistent"}},
+        {"integrator": {"method": "rk4"}},
+        {"integrator": {"method": "noh-bathe"}},
+        {"model": {"geometry": "small"}},
+    ],
+)
 def test_threads_do_not_change_a_bit_of_other_methods(tables):
     first = trajectory(panel("optimized", False, "free", **tables))
     threaded = tables | {"integrator": tables.get("integrator", {}) | {"threads": 2}}
@@ -103,6 +137,7 @@ def test_the_builds_of_the_kernels_agree_on_scenes_of_all_kinds(settings):
 
 def test_order_of_the_input_does_not_matter():
     """Scattered ids and segments give the same motion, to rounding: sums come in another order."""
+
     def by_place(shuffled):
         tables = panel("optimized", False, "free", side=12, shuffled=shuffled, interface={"expose": ["slave.r"]})
         simulation = tiefmu.Simulation(tiefmu.load(tables).model)
@@ -113,6 +148,7 @@ def test_order_of_the_input_does_not_matter():
             simulation.step(0.01)
         simulation.update_outputs()
         return simulation.get("slave_velocity")[order]
+
     np.testing.assert_allclose(by_place(True), by_place(False), rtol=1e-11, atol=1e-12)
 
 
@@ -127,13 +163,18 @@ def large(tmp_path_factory):
     scene_ = panel("default", False, "free", side=46, integrator={"threads": 4}, interface={"hide": ["master.f_ext"]})
     tiefmu.build(tiefmu.load(scene_), folder / "panel.fmu")
     return fmpy.extract(str(folder / "panel.fmu"), str(folder / "panel")), fmpy.read_model_description(
-        folder / "panel.fmu", validate=False)
+        folder / "panel.fmu", validate=False
+    )
 
 
 def started(large, threads: int):
     folder, description = large
-    fmu = fmpy.fmi2.FMU2Slave(guid=description.guid, unzipDirectory=folder, instanceName="panel",
-                              modelIdentifier=description.coSimulation.modelIdentifier)
+    fmu = fmpy.fmi2.FMU2Slave(
+        guid=description.guid,
+        unzipDirectory=folder,
+        instanceName="panel",
+        modelIdentifier=description.coSimulation.modelIdentifier,
+    )
     fmu.instantiate()
     fmu.setupExperiment()
     reference = next(v.valueReference for v in description.modelVariables if v.name == "integrator.threads")
@@ -169,9 +210,17 @@ def test_threads_are_a_parameter_of_the_fmu(large):
 
 @pytest.mark.parametrize("threads", [0, -1, 1.5, 257, float(2**40)])
 def test_numbers_of_threads_that_make_no_sense(tmp_path, threads):
-    tiefmu.build(tiefmu.load(panel("default", False, "free", side=4, integrator={"threads": 2})), tmp_path / "panel.fmu")
+    tiefmu.build(
+        tiefmu.load(panel("default", False, "free", side=4, integrator={"threads": 2})), tmp_path / "panel.fmu"
+    )
     said = []
     with pytest.raises(Exception):
-        fmpy.simulate_fmu(str(tmp_path / "panel.fmu"), stop_time=0.01, start_values={"integrator.threads": threads},
-                          logger=lambda *a: said.append(a[-1].decode() if isinstance(a[-1], bytes) else str(a[-1])))
-    assert any(f"integrator.threads is {threads:.6g}; it must be a whole number from 1 to 256" in line for line in said), said
+        fmpy.simulate_fmu(
+            str(tmp_path / "panel.fmu"),
+            stop_time=0.01,
+            start_values={"integrator.threads": threads},
+            logger=lambda *a: said.append(a[-1].decode() if isinstance(a[-1], bytes) else str(a[-1])),
+        )
+    assert any(
+        f"integrator.threads is {threads:.6g}; it must be a whole number from 1 to 256" in line for line in said
+    ), said

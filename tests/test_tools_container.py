@@ -6,7 +6,6 @@ import zipfile
 
 import numpy as np
 import pytest
-
 from tool_cases import EXAMPLE, NODES, STEP, build, call, plain, program, same_bits, tie_case
 
 MOVED = [f"master[{i}].v[{k}]" for i, k in NODES]
@@ -33,7 +32,7 @@ def test_its_checks_fail_for_a_description_that_is_wrong(folder):
             data = source.read(name)
             if name == "modelDescription.xml":
                 start = data.index(b"<Unknown", data.index(b"<Outputs>"))
-                data = data[:start] + data[data.index(b">", start) + 1:]
+                data = data[:start] + data[data.index(b">", start) + 1 :]
             target.writestr(name, data)
     with pytest.raises(AssertionError, match="is not listed in <Outputs>"):
         call(program("importers", "fmutool"), "-input", bad, "-check", cwd=folder)
@@ -42,8 +41,17 @@ def test_its_checks_fail_for_a_description_that_is_wrong(folder):
 def packed(description: dict, folder) -> str:
     """The container that fmucontainer makes of FMUs in the folder."""
     (folder / "pair.json").write_text(json.dumps(description))
-    call(program("importers", "fmucontainer"), "-container", "pair.json", "-fmu-directory", folder, "-no-auto-link",
-         "-no-auto-input", "-no-auto-output", cwd=folder)
+    call(
+        program("importers", "fmucontainer"),
+        "-container",
+        "pair.json",
+        "-fmu-directory",
+        folder,
+        "-no-auto-link",
+        "-no-auto-input",
+        "-no-auto-output",
+        cwd=folder,
+    )
     return str(folder / description["name"])
 
 
@@ -55,15 +63,27 @@ def test_a_container_of_two_ties(folder):
     alone = tie_case(str(first))
     inputs = alone["inputs"]["tie"]
     links = [(f"slave[1].v[{k}]", f"master[{i}].v[{k}]") for i, k in NODES]
-    container = packed({
-        "name": "pair.fmu", "step_size": STEP, "fmu": [first.name, second.name],
-        "link": [[first.name, here, second.name, there] for here, there in links],
-        "input": [[name, first.name, name] for name in inputs],
-        "output": [[fmu.name, name, f"{fmu.stem}_{name}"] for fmu in (first, second) for name in ANSWERS]}, folder)
+    container = packed(
+        {
+            "name": "pair.fmu",
+            "step_size": STEP,
+            "fmu": [first.name, second.name],
+            "link": [[first.name, here, second.name, there] for here, there in links],
+            "input": [[name, first.name, name] for name in inputs],
+            "output": [[fmu.name, name, f"{fmu.stem}_{name}"] for fmu in (first, second) for name in ANSWERS],
+        },
+        folder,
+    )
 
     outputs = [f"{fmu.stem}_{name}" for fmu in (first, second) for name in ANSWERS]
     found = plain({**alone, "fmus": {"pair": container}, "inputs": {"pair": inputs}, "outputs": {"pair": outputs}})
-    expected = plain({**alone, "fmus": {"first": str(first), "second": str(second)}, "inputs": {"first": inputs},
-                      "connections": [["first", here, "second", there] for here, there in links],
-                      "outputs": {"first": ANSWERS, "second": ANSWERS}})
+    expected = plain(
+        {
+            **alone,
+            "fmus": {"first": str(first), "second": str(second)},
+            "inputs": {"first": inputs},
+            "connections": [["first", here, "second", there] for here, there in links],
+            "outputs": {"first": ANSWERS, "second": ANSWERS},
+        }
+    )
     same_bits(found, {"pair": np.hstack([expected["first"], expected["second"]])})

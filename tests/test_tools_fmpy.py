@@ -10,7 +10,6 @@ import pytest
 from fmpy import fmi2
 from fmpy.util import write_csv
 from fmpy.validation import validate_fmu
-
 from tool_cases import CALLBACKS, EXAMPLE, STEP, build, call, plain, same_bits, tie_case
 
 STEPS = 120
@@ -48,16 +47,25 @@ def signals(inputs: dict, start=0.0) -> np.ndarray:
 
 def simulate(case, **options) -> np.ndarray:
     """Outputs at the start and after every step."""
-    options = {"input": signals(case["inputs"]["tie"]), "output": OUTPUTS, "output_interval": STEP,
-               "stop_time": STEPS * STEP, **options}
+    options = {
+        "input": signals(case["inputs"]["tie"]),
+        "output": OUTPUTS,
+        "output_interval": STEP,
+        "stop_time": STEPS * STEP,
+        **options,
+    }
     rows = fmpy.simulate_fmu(case["fmus"]["tie"], **options)
     return np.transpose([rows[name] for name in OUTPUTS])
 
 
 def instantiated(tie) -> fmi2.FMU2Slave:
     description = fmpy.read_model_description(tie)
-    instance = fmi2.FMU2Slave(guid=description.guid, unzipDirectory=fmpy.extract(tie), instanceName="tie",
-                              modelIdentifier=description.coSimulation.modelIdentifier)
+    instance = fmi2.FMU2Slave(
+        guid=description.guid,
+        unzipDirectory=fmpy.extract(tie),
+        instanceName="tie",
+        modelIdentifier=description.coSimulation.modelIdentifier,
+    )
     instance.instantiate(callbacks=CALLBACKS)
     return instance
 
@@ -68,12 +76,29 @@ def test_its_validation_finds_nothing(scene, folder):
 
 
 # Options that leave the trajectory as it is: those of model exchange, of FMI 3, of platforms, and of talking.
-@pytest.mark.parametrize("options", [
-    {}, {"validate": False}, {"stop_time": str(STEPS * STEP)}, {"solver": "Euler"}, {"step_size": 1e-5},
-    {"relative_tolerance": 1e-3}, {"record_events": False}, {"fmi_type": "CoSimulation"},
-    {"apply_default_start_values": True}, {"start_values": {"slave[1].f[3]": 0.0}}, {"timeout": 100.0},
-    {"visible": True}, {"remote_platform": None}, {"early_return_allowed": True}, {"use_event_mode": True},
-    {"terminate": False}, {"set_stop_time": False}], ids=str)
+@pytest.mark.parametrize(
+    "options",
+    [
+        {},
+        {"validate": False},
+        {"stop_time": str(STEPS * STEP)},
+        {"solver": "Euler"},
+        {"step_size": 1e-5},
+        {"relative_tolerance": 1e-3},
+        {"record_events": False},
+        {"fmi_type": "CoSimulation"},
+        {"apply_default_start_values": True},
+        {"start_values": {"slave[1].f[3]": 0.0}},
+        {"timeout": 100.0},
+        {"visible": True},
+        {"remote_platform": None},
+        {"early_return_allowed": True},
+        {"use_event_mode": True},
+        {"terminate": False},
+        {"set_stop_time": False},
+    ],
+    ids=str,
+)
 def test_options_that_change_no_bit(options, case, expected):
     same_bits({"tie": simulate(case, **options)[1:]}, {"tie": expected})
 
@@ -109,6 +134,7 @@ def test_what_it_logs(case, expected):
 
     def logger(environment, instance, status, category, message):
         said.append((status, message))
+
     found = simulate(case, debug_logging=True, logger=logger, fmi_call_logger=called.append)
     same_bits({"tie": found[1:]}, {"tie": expected})
     assert all(status == fmi2.fmi2OK for status, _ in said)
@@ -168,6 +194,7 @@ def test_a_serialized_state_in_a_new_instance(case, expected):
 
 
 # --------------------------------------------------------------------------------------------------------- cross-check
+
 
 def cross_check(case, sign: float, folder) -> list[str]:
     """What `python -m fmpy.cross_check` says of the tie, its inputs, and `sign` times the results of a plain sequence

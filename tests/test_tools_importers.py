@@ -5,7 +5,6 @@ Values are compared, never exit statuses: some importers report an FMU that they
 
 import numpy as np
 import pytest
-
 from tool_cases import build, coupled_case, plain, python_host, run_tool, same_bits, tie_case
 
 # When each passes values on and reads them; what it does is documented nowhere but in its answers.

@@ -9,7 +9,6 @@ from ctypes import byref, c_double, c_size_t, c_uint
 
 import numpy as np
 import pytest
-
 from fmu_calls import OK, Fmu, Instance
 
 STEP, STEPS = 2**-10, 200
@@ -28,24 +27,37 @@ EULER = {"method": "symplectic-euler"}  # a step needs the forces of its start o
 
 
 def host() -> dict:
-    return {"mesh": {"nodes": CORNERS + [[100 + i, *x] for i, *x in CORNERS], "segments": [[1, 1, 2, 3, 4]]},
-            "node": [FREE], "tie": [{"name": "corners", "slaves": [101, 102, 103, 104]}], "spring": [GROUND],
-            "integrator": EULER, "model": {"gravity": [0, 0, -9.81]}, "interface": {"expose": ["slave.a"]}}
+    return {
+        "mesh": {"nodes": CORNERS + [[100 + i, *x] for i, *x in CORNERS], "segments": [[1, 1, 2, 3, 4]]},
+        "node": [FREE],
+        "tie": [{"name": "corners", "slaves": [101, 102, 103, 104]}],
+        "spring": [GROUND],
+        "integrator": EULER,
+        "model": {"gravity": [0, 0, -9.81]},
+        "interface": {"expose": ["slave.a"]},
+    }
 
 
 def tie(mass: float) -> dict:
-    return {"mesh": {"nodes": CORNERS + [PART], "segments": [[1, 1, 2, 3, 4]]},
-            "node": [{"nodes": [101], "mass": mass, "inertia": 2e-4 * mass}],
-            "tie": [{"name": "part", "slaves": [101], "formulation": "optimized"}],
-            "spring": [{"ground": [101], "kind": "bushing", "stiffness": [1e4, 2e4, 1e4], "damping": 5.0}],
-            "model": {"inertia": "consistent", "reaction": "full", "gravity": [0, 0, -9.81]}}
+    return {
+        "mesh": {"nodes": CORNERS + [PART], "segments": [[1, 1, 2, 3, 4]]},
+        "node": [{"nodes": [101], "mass": mass, "inertia": 2e-4 * mass}],
+        "tie": [{"name": "part", "slaves": [101], "formulation": "optimized"}],
+        "spring": [{"ground": [101], "kind": "bushing", "stiffness": [1e4, 2e4, 1e4], "damping": 5.0}],
+        "model": {"inertia": "consistent", "reaction": "full", "gravity": [0, 0, -9.81]},
+    }
 
 
 def whole(mass: float) -> dict:
     """Host and tie in one scene."""
     scene = tie(mass)
-    return {**scene, "node": [FREE, *scene["node"]], "spring": [GROUND, *scene["spring"]], "integrator": EULER,
-            "model": {"inertia": "consistent", "gravity": [0, 0, -9.81]}}
+    return {
+        **scene,
+        "node": [FREE, *scene["node"]],
+        "spring": [GROUND, *scene["spring"]],
+        "integrator": EULER,
+        "model": {"inertia": "consistent", "gravity": [0, 0, -9.81]},
+    }
 
 
 def pull(n: int) -> dict:
@@ -62,6 +74,7 @@ def scenes(tmp_path_factory):
         if mass not in built:
             built[mass] = [Fmu(scene, folder) for scene in (host(), tie(mass), whole(mass))]
         return built[mass]
+
     return get
 
 
@@ -75,8 +88,15 @@ def jacobian(instance: Instance, outputs, inputs) -> np.ndarray:
     found = np.empty((len(outputs), len(inputs)))
     for column, name in enumerate(inputs):
         change = (c_double * len(outputs))(*[np.nan] * len(outputs))
-        status = instance.call("GetDirectionalDerivative", rows, c_size_t(len(outputs)),
-                               (c_uint * 1)(instance.fmu.reference[name]), c_size_t(1), (c_double * 1)(1.0), change)
+        status = instance.call(
+            "GetDirectionalDerivative",
+            rows,
+            c_size_t(len(outputs)),
+            (c_uint * 1)(instance.fmu.reference[name]),
+            c_size_t(1),
+            (c_double * 1)(1.0),
+            change,
+        )
         assert status == OK, instance.log
         found[:, column] = change[:]
     return found
@@ -90,6 +110,7 @@ def held(host, tie, time, loads):
 def by_rollback(passes: int, share: float):
     """Steps the host on trial, shows the tie the acceleration that came of it, and puts the host back. share: of the
     tie's answer in the next guess; 1/(1 + r) is exact at once where all motions have the mass ratio r (THEORY 5)."""
+
     def solve(host, tie, time, loads):
         state, before = host.save(), host.get(SPEEDS)
         for _ in range(passes):
@@ -101,6 +122,7 @@ def by_rollback(passes: int, share: float):
             loads = (1 - share) * loads + share * tie.get(FORCES)
         assert host.call("FreeFMUstate", byref(state)) == OK
         return loads
+
     return solve
 
 

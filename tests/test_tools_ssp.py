@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from fmpy.ssp.simulation import simulate_ssp
 from fmpy.ssp.ssd import get_connections, read_ssd
-
 from tool_cases import EXAMPLE, call, coupled_case, plain, program, run_tool, same_bits
 
 specification = importlib.util.spec_from_file_location("build_ssp", EXAMPLE / "build_ssp.py")
@@ -61,11 +60,24 @@ def test_importers_run_it(tool, order, ssp, case, folder):
 
 def test_a_container_of_it_runs(ssp, case, folder):
     """The FMU Manipulation Toolbox packs the system into one FMU, which shows the connected values."""
-    call(program("importers", "fmucontainer"), "-container", f"host_and_tie.ssp:{case['step']}", "-fmu-directory",
-         folder, cwd=folder)
+    call(
+        program("importers", "fmucontainer"),
+        "-container",
+        f"host_and_tie.ssp:{case['step']}",
+        "-fmu-directory",
+        folder,
+        cwd=folder,
+    )
     sources = [(part, name) for part, name, _, _ in case["connections"]]
-    found = plain({**case, "fmus": {"both": str(folder / "host_and_tie.fmu")}, "connections": [],
-                   "outputs": {"both": [f"{part}.{name}" for part, name in sources]}})
+    found = plain(
+        {
+            **case,
+            "fmus": {"both": str(folder / "host_and_tie.fmu")},
+            "connections": [],
+            "outputs": {"both": [f"{part}.{name}" for part, name in sources]},
+        }
+    )
     expected = plain(case)
-    same_bits(found, {"both": np.transpose([expected[part][:, case["outputs"][part].index(name)]
-                                            for part, name in sources])})
+    same_bits(
+        found, {"both": np.transpose([expected[part][:, case["outputs"][part].index(name)] for part, name in sources])}
+    )

@@ -10,9 +10,8 @@ from pathlib import Path
 
 import fmpy
 import numpy as np
-from fmpy.fmi2 import FMU2Slave, defaultCallbacks, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
-
 import tiefmu
+from fmpy.fmi2 import FMU2Slave, defaultCallbacks, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
 
 ROOT = Path(__file__).resolve().parents[1]
 TOOLS = ROOT / "build" / "tools"
@@ -22,8 +21,13 @@ NODES = [(i, k) for i in range(1, 5) for k in range(1, 4)]
 
 
 # FMPy's own callbacks hand messages to whatever logger was set last in this process, also when that is gone.
-CALLBACKS = fmi2CallbackFunctions(fmi2CallbackLoggerTYPE(lambda *message: None), defaultCallbacks.allocateMemory,
-                                  defaultCallbacks.freeMemory, defaultCallbacks.stepFinished, None)
+CALLBACKS = fmi2CallbackFunctions(
+    fmi2CallbackLoggerTYPE(lambda *message: None),
+    defaultCallbacks.allocateMemory,
+    defaultCallbacks.freeMemory,
+    defaultCallbacks.stepFinished,
+    None,
+)
 
 
 def program(environment: str, name: str) -> str:
@@ -62,8 +66,12 @@ def plain(case: dict, exchange_first=True, read_last=False) -> dict[str, np.ndar
     for name, path in case["fmus"].items():
         description = fmpy.read_model_description(path)
         references[name] = {v.name: v.valueReference for v in description.modelVariables}
-        slaves[name] = FMU2Slave(instanceName=name, guid=description.guid, unzipDirectory=fmpy.extract(path),
-                                 modelIdentifier=description.coSimulation.modelIdentifier)
+        slaves[name] = FMU2Slave(
+            instanceName=name,
+            guid=description.guid,
+            unzipDirectory=fmpy.extract(path),
+            modelIdentifier=description.coSimulation.modelIdentifier,
+        )
         slaves[name].instantiate(callbacks=CALLBACKS)
         slaves[name].setupExperiment(startTime=0.0)
         slaves[name].enterInitializationMode()
@@ -86,8 +94,9 @@ def plain(case: dict, exchange_first=True, read_last=False) -> dict[str, np.ndar
         for name, inputs in case["inputs"].items():
             slaves[name].setReal([references[name][v] for v in inputs], [values[k] for values in inputs.values()])
         for name, slopes in case.get("derivatives", {}).items():
-            slaves[name].setRealInputDerivatives([references[name][v] for v in slopes], [1] * len(slopes),
-                                                 [values[k] for values in slopes.values()])
+            slaves[name].setRealInputDerivatives(
+                [references[name][v] for v in slopes], [1] * len(slopes), [values[k] for values in slopes.values()]
+            )
         for slave in slaves.values():
             slave.doStep(k * case["step"], case["step"])
         if not read_last:
@@ -115,8 +124,15 @@ def build(name: str, folder: Path) -> str:
 
 def python_host(folder: Path) -> str:
     """The host written in Python, packed by PythonFMU."""
-    call(program("importers", "pythonfmu"), "build", "-f", ROOT / "tests" / "tools" / "sprung_host.py", "-d", folder,
-         "--no-external-tool")
+    call(
+        program("importers", "pythonfmu"),
+        "build",
+        "-f",
+        ROOT / "tests" / "tools" / "sprung_host.py",
+        "-d",
+        folder,
+        "--no-external-tool",
+    )
     return str(folder / "SprungHost.fmu")
 
 
@@ -124,17 +140,27 @@ def tie_case(tie: str, steps=150) -> dict:
     """The tie alone: its masters' velocities and the force on its slave are given."""
     inputs = {f"master[{i}].v[{k}]": [math.sin(0.11 * n * k + i) for n in range(steps)] for i, k in NODES}
     inputs["slave[1].f[3]"] = [40.0 * math.cos(0.07 * n) for n in range(steps)]
-    return {"fmus": {"tie": tie}, "connections": [], "inputs": {"tie": inputs},
-            "outputs": {"tie": [f"master[{i}].f[{k}]" for i, k in NODES] + [f"slave[1].v[{k}]" for k in (1, 2, 3)]},
-            "step": STEP, "steps": steps}
+    return {
+        "fmus": {"tie": tie},
+        "connections": [],
+        "inputs": {"tie": inputs},
+        "outputs": {"tie": [f"master[{i}].f[{k}]" for i, k in NODES] + [f"slave[1].v[{k}]" for k in (1, 2, 3)]},
+        "step": STEP,
+        "steps": steps,
+    }
 
 
 def coupled_case(host: str, tie: str, steps=150) -> dict:
     """Host and tie: velocities go one way, loads the other; a force pulls the slave to and fro."""
-    return {"fmus": {"host": host, "tie": tie},
-            "connections": [["host", f"master[{i}].v[{k}]", "tie", f"master[{i}].v[{k}]"] for i, k in NODES]
-            + [["tie", f"master[{i}].f[{k}]", "host", f"master[{i}].f_ext[{k}]"] for i, k in NODES],
-            "inputs": {"tie": {"slave[1].f[1]": [50.0 * math.sin(0.1 * n) for n in range(steps)]}},
-            "outputs": {"host": [f"master[{i}].v[{k}]" for i, k in NODES],
-                        "tie": [f"master[{i}].f[{k}]" for i, k in NODES] + [f"slave[1].v[{k}]" for k in (1, 2, 3)]},
-            "step": STEP, "steps": steps}
+    return {
+        "fmus": {"host": host, "tie": tie},
+        "connections": [["host", f"master[{i}].v[{k}]", "tie", f"master[{i}].v[{k}]"] for i, k in NODES]
+        + [["tie", f"master[{i}].f[{k}]", "host", f"master[{i}].f_ext[{k}]"] for i, k in NODES],
+        "inputs": {"tie": {"slave[1].f[1]": [50.0 * math.sin(0.1 * n) for n in range(steps)]}},
+        "outputs": {
+            "host": [f"master[{i}].v[{k}]" for i, k in NODES],
+            "tie": [f"master[{i}].f[{k}]" for i, k in NODES] + [f"slave[1].v[{k}]" for k in (1, 2, 3)],
+        },
+        "step": STEP,
+        "steps": steps,
+    }

@@ -1,6 +1,6 @@
 """Builds host_and_tie.ssp (SSP 1.0): the two FMUs, the velocities that go one way and the loads that come back.
 
-    python examples/host_and_tie/build_ssp.py [FILE]
+python examples/host_and_tie/build_ssp.py [FILE]
 """
 
 import sys
@@ -10,7 +10,6 @@ from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
 import fmpy
-
 import tiefmu
 
 HERE = Path(__file__).resolve().parent
@@ -21,14 +20,19 @@ SSP1 = "http://ssp-standard.org/SSP1/SystemStructure"
 
 def connections(descriptions) -> list[tuple[str, str, str, str]]:
     """(from part, output, to part, input): `v` of a node to `v`, `f` to `f_ext`."""
-    names = {part: {v.name: v.causality for v in description.modelVariables}
-             for part, description in descriptions.items()}
+    names = {
+        part: {v.name: v.causality for v in description.modelVariables} for part, description in descriptions.items()
+    }
     found = []
     for source, target, here, there in (("host", "tie", ".v[", ".v["), ("tie", "host", ".f[", ".f_ext[")):
         for name, causality in names[source].items():
             other = name.replace(here, there)
-            if name.startswith("master") and here in name and causality == "output" \
-                    and names[target].get(other) == "input":
+            if (
+                name.startswith("master")
+                and here in name
+                and causality == "output"
+                and names[target].get(other) == "input"
+            ):
                 found.append((source, name, target, other))
     return found
 
@@ -37,23 +41,38 @@ def structure(descriptions) -> str:
     """SystemStructure.ssd."""
     # Inputs that nothing feeds are left out: they keep their start values, and FMPy would feed them from elsewhere.
     fed = {(target, there) for _, _, target, there in connections(descriptions)}
-    lines = ['<?xml version="1.0" encoding="UTF-8"?>',
-             f'<ssd:SystemStructureDescription xmlns:ssd="{SSP1}Description" xmlns:ssc="{SSP1}Common"'
-             ' version="1.0" name="host_and_tie">',
-             '  <ssd:System name="system">', '    <ssd:Elements>']
+    lines = [
+        '<?xml version="1.0" encoding="UTF-8"?>',
+        f'<ssd:SystemStructureDescription xmlns:ssd="{SSP1}Description" xmlns:ssc="{SSP1}Common"'
+        ' version="1.0" name="host_and_tie">',
+        '  <ssd:System name="system">',
+        "    <ssd:Elements>",
+    ]
     for part, description in descriptions.items():
-        lines += [f'      <ssd:Component name="{part}" type="application/x-fmu-sharedlibrary"'
-                  f' source="resources/{part}.fmu" implementation="CoSimulation">', '        <ssd:Connectors>']
-        lines += [f'          <ssd:Connector name={quoteattr(v.name)} kind="{v.causality}"><ssc:Real/></ssd:Connector>'
-                  for v in description.modelVariables if v.causality == "output" or (part, v.name) in fed]
-        lines += ['        </ssd:Connectors>', '      </ssd:Component>']
-    lines += ['    </ssd:Elements>', '    <ssd:Connections>']
-    lines += [f'      <ssd:Connection startElement="{source}" startConnector={quoteattr(here)}'
-              f' endElement="{target}" endConnector={quoteattr(there)}/>'
-              for source, here, target, there in connections(descriptions)]
-    lines += ['    </ssd:Connections>', '  </ssd:System>',
-              f'  <ssd:DefaultExperiment startTime="0" stopTime="{STOP_TIME}"/>',
-              '</ssd:SystemStructureDescription>', '']
+        lines += [
+            f'      <ssd:Component name="{part}" type="application/x-fmu-sharedlibrary"'
+            f' source="resources/{part}.fmu" implementation="CoSimulation">',
+            "        <ssd:Connectors>",
+        ]
+        lines += [
+            f'          <ssd:Connector name={quoteattr(v.name)} kind="{v.causality}"><ssc:Real/></ssd:Connector>'
+            for v in description.modelVariables
+            if v.causality == "output" or (part, v.name) in fed
+        ]
+        lines += ["        </ssd:Connectors>", "      </ssd:Component>"]
+    lines += ["    </ssd:Elements>", "    <ssd:Connections>"]
+    lines += [
+        f'      <ssd:Connection startElement="{source}" startConnector={quoteattr(here)}'
+        f' endElement="{target}" endConnector={quoteattr(there)}/>'
+        for source, here, target, there in connections(descriptions)
+    ]
+    lines += [
+        "    </ssd:Connections>",
+        "  </ssd:System>",
+        f'  <ssd:DefaultExperiment startTime="0" stopTime="{STOP_TIME}"/>',
+        "</ssd:SystemStructureDescription>",
+        "",
+    ]
     return "\n".join(lines)
 
 
@@ -62,8 +81,10 @@ def build(path: Path) -> Path:
     with tempfile.TemporaryDirectory() as folder:
         fmus = {part: tiefmu.build(tiefmu.load(HERE / f"{part}.toml"), Path(folder) / f"{part}.fmu") for part in PARTS}
         descriptions = {part: fmpy.read_model_description(str(fmu)) for part, fmu in fmus.items()}
-        files = {"SystemStructure.ssd": structure(descriptions).encode(),
-                 **{f"resources/{part}.fmu": fmu.read_bytes() for part, fmu in fmus.items()}}
+        files = {
+            "SystemStructure.ssd": structure(descriptions).encode(),
+            **{f"resources/{part}.fmu": fmu.read_bytes() for part, fmu in fmus.items()},
+        }
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, data in files.items():
             archive.writestr(zipfile.ZipInfo(name), data)

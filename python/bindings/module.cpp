@@ -34,14 +34,12 @@ using Bytes = nb::ndarray<const std::uint8_t, nb::ndim<1>, nb::c_contig, nb::dev
 using Values = nb::ndarray<const double, nb::c_contig, nb::device::cpu>;
 
 // A NumPy array of `shape` that owns `values`.
-template <class T>
-nb::object numpy(std::vector<T> values, std::initializer_list<std::size_t> shape) {
+template <class T> nb::object numpy(std::vector<T> values, std::initializer_list<std::size_t> shape) {
   auto* owner = new std::vector<T>(std::move(values));
   nb::capsule guard(owner, [](void* p) noexcept { delete static_cast<std::vector<T>*>(p); });
   return nb::ndarray<nb::numpy, T>(owner->data(), shape.size(), shape.begin(), guard).cast();
 }
-template <class T>
-nb::object numpy(std::vector<T> values) {
+template <class T> nb::object numpy(std::vector<T> values) {
   const std::size_t n = values.size();
   return numpy(std::move(values), {n});
 }
@@ -50,8 +48,7 @@ void require(bool condition, const std::string& message) {
   if (!condition) throw std::invalid_argument(message);
 }
 
-template <class E>
-E choose(const std::string& text, std::initializer_list<std::pair<const char*, E>> names) {
+template <class E> E choose(const std::string& text, std::initializer_list<std::pair<const char*, E>> names) {
   for (const auto& [name, value] : names)
     if (text == name) return value;
   throw std::invalid_argument("unknown choice '" + text + "'");
@@ -70,16 +67,15 @@ std::vector<int> indices(const Indices& array, std::size_t limit, int lowest, co
   return result;
 }
 
-template <class T, class Array>
-std::vector<T> list(const Array& array) {
+template <class T, class Array> std::vector<T> list(const Array& array) {
   return std::vector<T>(array.data(), array.data() + array.shape(0));
 }
 
 // ---- Scene
 
 void setNodes(Scene& scene, const Ids& id, const Vectors& position, const Bytes& motion, const Bytes& rotations,
-              const Doubles& mass, const Doubles& inertia, const Doubles& stiffness,
-              const Doubles& rotationalStiffness, const Vectors& velocity, const Vectors& spin) {
+              const Doubles& mass, const Doubles& inertia, const Doubles& stiffness, const Doubles& rotationalStiffness,
+              const Vectors& velocity, const Vectors& spin) {
   const std::size_t n = id.shape(0);
   for (std::size_t count : {position.shape(0), motion.shape(0), rotations.shape(0), mass.shape(0), inertia.shape(0),
                             stiffness.shape(0), rotationalStiffness.shape(0), velocity.shape(0), spin.shape(0)})
@@ -165,8 +161,8 @@ void setSettings(Scene& scene, const std::string& inertia, const std::string& re
                  const std::vector<std::string>& hide) {
   Settings& s = scene.settings;
   s.inertia = choose<Inertia>(inertia, {{"lumped", Inertia::lumped}, {"consistent", Inertia::consistent}});
-  s.reaction = choose<Reaction>(
-      reaction, {{"loads", Reaction::loads}, {"full", Reaction::full}, {"split", Reaction::split}});
+  s.reaction =
+      choose<Reaction>(reaction, {{"loads", Reaction::loads}, {"full", Reaction::full}, {"split", Reaction::split}});
   s.geometry = choose<Geometry>(geometry, {{"finite", Geometry::finite}, {"small", Geometry::small}});
   s.position = choose<Position>(position, {{"integrated", Position::integrated}, {"input", Position::input}});
   s.gravity = at(gravity.data(), 0);
@@ -258,8 +254,9 @@ nb::dict reportNodes(const Model& model) {
       master[static_cast<std::size_t>(i)] = model.isMaster(g);
       const bool isFree = i >= model.freeBegin() && i < model.freeEnd();
       const bool fixed = g == rotatingFixedMaster || g == rotatingFixedPoint || g == fixedMaster || g == fixedPoint;
-      motion[static_cast<std::size_t>(i)] =
-          static_cast<std::uint8_t>(isFree ? Motion::free : fixed ? Motion::fixed : Motion::driven);
+      motion[static_cast<std::size_t>(i)] = static_cast<std::uint8_t>(isFree  ? Motion::free
+                                                                      : fixed ? Motion::fixed
+                                                                              : Motion::driven);
     }
   nb::dict d;
   d["id"] = numpy(model.nodeId);
@@ -443,9 +440,7 @@ class Run {
     throw nb::key_error(("no field '" + name + "'").c_str());
   }
 
-  void changed(Field f) {
-    f < Field::addedMass ? simulation.parametersChanged() : simulation.inputsChanged();
-  }
+  void changed(Field f) { f < Field::addedMass ? simulation.parametersChanged() : simulation.inputsChanged(); }
 
   // Block of the variable and its place in the data.
   std::pair<const Block*, std::size_t> place(const std::string& name) {
@@ -453,8 +448,7 @@ class Run {
       for (const Block& b : blocks)
         for (std::size_t k = 0; k < b.count(); ++k) {
           const std::size_t components = static_cast<std::size_t>(b.components);
-          places.emplace(variableName(b, k / components, static_cast<int>(k % components)),
-                         std::pair(&b, b.place + k));
+          places.emplace(variableName(b, k / components, static_cast<int>(k % components)), std::pair(&b, b.place + k));
         }
     const auto entry = places.find(name);
     if (entry == places.end()) throw nb::key_error(("no variable '" + name + "'").c_str());
@@ -471,10 +465,10 @@ class Run {
 NB_MODULE(_core, m) {
   using namespace tiefmu;
   m.doc() = "The tied interface's solver; see src/scene.hpp, src/model.hpp and src/simulation.hpp.";
-  nb::exception<SceneError>(m, "SceneError", PyExc_ValueError)
-      .attr("__doc__") = "A scene that cannot be read, modelled or started; one line 'FILE: table: id: message'.";
-  nb::exception<Diverged>(m, "Diverged", PyExc_RuntimeError)
-      .attr("__doc__") = "A step ended in a non-finite or runaway number; the state before it has been put back.";
+  nb::exception<SceneError>(m, "SceneError", PyExc_ValueError).attr("__doc__") =
+      "A scene that cannot be read, modelled or started; one line 'FILE: table: id: message'.";
+  nb::exception<Diverged>(m, "Diverged", PyExc_RuntimeError).attr("__doc__") =
+      "A step ended in a non-finite or runaway number; the state before it has been put back.";
 
   nb::class_<Scene>(m, "Scene", "Nodes, segments, ties and springs as arrays, by index. SI units.")
       .def(nb::init<>())
@@ -501,20 +495,22 @@ NB_MODULE(_core, m) {
   nb::class_<Model>(m, "Model", "A scene searched, checked and sorted. Constant.")
       .def(nb::new_(&compileScene), "scene"_a, "Raises SceneError.")
       .def("report", &report, "What there is to tell: arrays over slaves and nodes in the model's order, findings.")
-      .def("resource",
-           [](const Model& model, const std::string& guid) {
-             const std::string bytes = writeResource(model, guid);
-             return nb::bytes(bytes.data(), bytes.size());
-           },
-           "guid"_a, "resources/scene.bin of the FMU, as bytes.");
+      .def(
+          "resource",
+          [](const Model& model, const std::string& guid) {
+            const std::string bytes = writeResource(model, guid);
+            return nb::bytes(bytes.data(), bytes.size());
+          },
+          "guid"_a, "resources/scene.bin of the FMU, as bytes.");
   nb::class_<Xml>(m, "Description", "modelDescription.xml of a model's FMU. Analysed once.")
       .def(nb::init<const Model&, std::string, std::string>(), nb::keep_alive<1, 2>(), "model"_a, "name"_a, "title"_a,
            "name: of the scene; title: free text. Raises SceneError where the model cannot start.")
-      .def("write",
-           [](const Xml& description, const std::string& guid, nb::callable sink) {
-             description.write(guid, [&](std::string_view text) { sink(nb::bytes(text.data(), text.size())); });
-           },
-           "guid"_a, "sink"_a, "Calls sink(bytes) with the text, piece by piece.")
+      .def(
+          "write",
+          [](const Xml& description, const std::string& guid, nb::callable sink) {
+            description.write(guid, [&](std::string_view text) { sink(nb::bytes(text.data(), text.size())); });
+          },
+          "guid"_a, "sink"_a, "Calls sink(bytes) with the text, piece by piece.")
       .def_prop_ro("step_size", &Xml::stepSize, "Of the default experiment, s.");
   m.def("model_identifier", &modelIdentifier, "name"_a, "The C identifier that an FMU of this name uses.");
 
@@ -523,13 +519,17 @@ NB_MODULE(_core, m) {
 
   nb::class_<Run>(m, "Simulation", "One running instance of a model, as the FMU runs it.")
       .def(nb::init<std::shared_ptr<Model>>(), "model"_a)
-      .def("reset", [](Run& r) { r.simulation.reset(); }, "Back to the start values, as constructed.")
-      .def("initialise", [](Run& r, double t) { r.simulation.initialise(t); }, "time"_a = 0.0,
-           "Start time, s. Raises SceneError, e.g. for a free node without mass.")
-      .def("step", [](Run& r, double h) { r.simulation.step(h); }, "duration"_a,
-           "Forward by `duration` s, in equal substeps within the limit. Raises Diverged.")
-      .def("update_outputs", [](Run& r) { r.simulation.updateOutputs(); },
-           "Brings outputs in line with the inputs last set; the getters do it by themselves.")
+      .def(
+          "reset", [](Run& r) { r.simulation.reset(); }, "Back to the start values, as constructed.")
+      .def(
+          "initialise", [](Run& r, double t) { r.simulation.initialise(t); }, "time"_a = 0.0,
+          "Start time, s. Raises SceneError, e.g. for a free node without mass.")
+      .def(
+          "step", [](Run& r, double h) { r.simulation.step(h); }, "duration"_a,
+          "Forward by `duration` s, in equal substeps within the limit. Raises Diverged.")
+      .def(
+          "update_outputs", [](Run& r) { r.simulation.updateOutputs(); },
+          "Brings outputs in line with the inputs last set; the getters do it by themselves.")
       .def("get", &Run::get, "field"_a, "A copy of the field: (n, 3), (n, 4) or (n), rows as in Model.report().")
       .def("set", &Run::set, "field"_a, "values"_a, "Writes the whole field, of any shape with as many values.")
       .def("get_values", &Run::getValues, "names"_a, "Values of variables by their FMU names, e.g. slave[1].v[3].")
@@ -540,13 +540,16 @@ NB_MODULE(_core, m) {
              r.simulation.save(state);
              return state;
            })
-      .def("restore", [](Run& r, const Simulation::State& state) { r.simulation.restore(state); }, "state"_a)
+      .def(
+          "restore", [](Run& r, const Simulation::State& state) { r.simulation.restore(state); }, "state"_a)
       .def_prop_ro("fields", &Run::fields, "Names of the model's fields and how many values each has.")
       .def_prop_ro("variables", &Run::variables, "The FMU's variables, as a list of blocks in value reference order.")
       .def_prop_ro("time", [](const Run& r) { return r.simulation.time(); })
-      .def_prop_ro("evaluations", [](const Run& r) { return r.simulation.evaluations(); }, "Force evaluations so far.")
-      .def_prop_ro("integrator_limit", [](const Run& r) { return r.simulation.integratorLimit(); },
-                   "Largest stable step of the chosen integrator, damping included, s (1e30: none).");
+      .def_prop_ro(
+          "evaluations", [](const Run& r) { return r.simulation.evaluations(); }, "Force evaluations so far.")
+      .def_prop_ro(
+          "integrator_limit", [](const Run& r) { return r.simulation.integratorLimit(); },
+          "Largest stable step of the chosen integrator, damping included, s (1e30: none).");
 
   bindKernels(m);
 }

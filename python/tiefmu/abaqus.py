@@ -108,7 +108,7 @@ class InputFile:
 
 
 def parse_keyword(line: str) -> tuple[str, dict]:
-    """"*Element, type=S4R" -> ("ELEMENT", {"TYPE": "S4R"}); names of sets keep their case."""
+    """ "*Element, type=S4R" -> ("ELEMENT", {"TYPE": "S4R"}); names of sets keep their case."""
     keyword, *rest = line[1:].split(",")
     options = {}
     for item in rest:

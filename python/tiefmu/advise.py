@@ -7,22 +7,29 @@ import numpy as np
 
 from ._core import Diverged, SceneError
 
-SAFETY = 0.9      # of the stability limit: no step above it is advised
-HALVINGS = 12     # of the first step, before a method is given up
-ALIKE = 1.1       # costs closer than this factor count as equal; then the simpler choice wins
+SAFETY = 0.9  # of the stability limit: no step above it is advised
+HALVINGS = 12  # of the first step, before a method is given up
+ALIKE = 1.1  # costs closer than this factor count as equal; then the simpler choice wins
 
 
 def add_parser(commands):
     from .cli import positive
+
     parser = commands.add_parser(
-        "advise", help="say what a scene needs and no more",
+        "advise",
+        help="say what a scene needs and no more",
         description="Measures error and cost of every model and method that the scene allows, and names the cheapest "
         "whose error stays under the tolerance: relative L2 over the whole run, of the slaves' velocities; of the "
-        "reactions too where every master is driven.")
+        "reactions too where every master is driven.",
+    )
     parser.add_argument("scene", metavar="SCENE", help="scene file (TOML)")
     parser.add_argument("--tolerance", metavar="E", type=positive, default=1e-3, help="relative error (default: 1e-3)")
-    parser.add_argument("--input", metavar="CSV", type=Path,
-                        help="inputs over time, as for `tiefmu run` (default: NAME.csv beside NAME.toml, if there)")
+    parser.add_argument(
+        "--input",
+        metavar="CSV",
+        type=Path,
+        help="inputs over time, as for `tiefmu run` (default: NAME.csv beside NAME.toml, if there)",
+    )
     parser.add_argument("--write", metavar="NEW", type=Path, help="write the scene as advised")
     parser.set_defaults(command=command)
 
@@ -30,6 +37,7 @@ def add_parser(commands):
 def command(options):
     from .study.speed_accuracy import inputs_beside
     from .study.variants import Source
+
     if options.write and not options.write.parent.is_dir():
         raise SceneError(f"{options.write}: folder {options.write.parent} does not exist")
     source = Source(options.scene)
@@ -44,13 +52,14 @@ def command(options):
 class Choice:
     """One model, method and step with what was measured. step: s, of the integrator, or of the communication where
     nothing is integrated."""
+
     variant: object
     method: str
     reaction: str
     step: float
     error_v: float
     error_f: float
-    cost: float              # s of CPU time per simulated second
+    cost: float  # s of CPU time per simulated second
     coarser: tuple[float, float]  # next larger step that was tried, and its error (inf: unstable); nan: none
 
     @property
@@ -67,10 +76,10 @@ class Choice:
 class Advice:
     tolerance: float
     choice: Choice
-    others: list[Choice]     # what else stays under the tolerance, cheapest first
-    models: list             # (variant, model error) of every model, cheapest first
-    mass_ratio: float        # r of the driven masters, nan: none
-    limit: float             # stability limit of the chosen method, s
+    others: list[Choice]  # what else stays under the tolerance, cheapest first
+    models: list  # (variant, model error) of every model, cheapest first
+    mass_ratio: float  # r of the driven masters, nan: none
+    limit: float  # stability limit of the chosen method, s
 
     def lines(self, source) -> list[str]:
         c = self.choice
@@ -79,14 +88,19 @@ class Advice:
         def instead(variant):
             return f"{error_text(errors[variant])} at any step" if variant in errors else "which this scene cannot have"
 
-        lines = [f"{source.file}: error {error_text(c.error)} of {error_text(self.tolerance)} allowed, "
-                 f"{c.cost:.3g} s CPU per simulated second"]
+        lines = [
+            f"{source.file}: error {error_text(c.error)} of {error_text(self.tolerance)} allowed, "
+            f"{c.cost:.3g} s CPU per simulated second"
+        ]
         dropped = replace(c.variant, freedoms="translations")
         if c.variant.freedoms != "all":
             lines.append(f"freedoms: translations only; model error {error_text(errors[c.variant])}")
         elif len(source.scene.rotations):
-            without = (f"the error is {instead(dropped)}" if dropped in errors else
-                       "the springs and slaves that need them have no model")
+            without = (
+                f"the error is {instead(dropped)}"
+                if dropped in errors
+                else "the springs and slaves that need them have no model"
+            )
             lines.append(f"freedoms: all; without the rotations of the masters {without}")
         else:
             lines.append("freedoms: all (translations only; there are no rotations to leave out)")
@@ -97,14 +111,19 @@ class Advice:
             else:
                 lines.append(f"{key}: {costly}; {cheap} would cost {instead(replace(c.variant, **{key: cheap}))}")
         if c.driven:
-            lines.append(f"integrator: none, every master is driven; communication step {c.step:.4g} s with the "
-                         f"velocity of the {'start' if c.method == 'held input' else 'middle'} of the step held in it")
+            lines.append(
+                f"integrator: none, every master is driven; communication step {c.step:.4g} s with the "
+                f"velocity of the {'start' if c.method == 'held input' else 'middle'} of the step held in it"
+            )
         else:
             lines.append(f"integrator: {c.method}, step {c.step:.4g} s, {c.step / self.limit:.2f} of its limit")
         if not np.isnan(c.coarser[0]):
             lines.append(f"  next larger step tried: {c.coarser[0]:.4g} s, error {error_text(c.coarser[1])}")
-        lines += [f"  instead: {describe(other)}: error {error_text(other.error)}, {other.cost / c.cost:.2f} times the "
-                  "CPU time" for other in self.others[:4]]
+        lines += [
+            f"  instead: {describe(other)}: error {error_text(other.error)}, {other.cost / c.cost:.2f} times the "
+            "CPU time"
+            for other in self.others[:4]
+        ]
         if not np.isnan(self.mass_ratio):
             lines.append(self.reaction_line(c))
         return lines
@@ -112,9 +131,12 @@ class Advice:
     def reaction_line(self, c: Choice) -> str:
         r = self.mass_ratio
         ratio = "without bound (a driven master has no mass)" if np.isinf(r) else f"{r:.3g}"
-        full = (f"full is refused: the tied mass over the host's is r = {ratio}, and a host that uses the last known "
-                "force diverges at r >= 1 for every step" if not r < 1 else
-                f"full would be stable for a held force (r = {ratio} < 1), but not at r >= 1/2 with BDF2 velocities")
+        full = (
+            f"full is refused: the tied mass over the host's is r = {ratio}, and a host that uses the last known "
+            "force diverges at r >= 1 for every step"
+            if not r < 1
+            else f"full would be stable for a held force (r = {ratio} < 1), but not at r >= 1/2 with BDF2 velocities"
+        )
         return f"reaction: {c.reaction}, stable for any host; {full}"
 
 
@@ -130,6 +152,7 @@ def error_text(error: float) -> str:
 def advise(source, inputs: Path | None, tolerance: float) -> Advice:
     """Raises SceneError, also where nothing reaches the tolerance."""
     from .study.motion import Signals
+
     signals = Signals.read(source.scene, inputs)
     ratio = mass_ratio(source) if source.any_driven else np.nan
     search = (FreeSearch if source.any_free else DrivenSearch)(source, signals, tolerance, ratio)
@@ -144,18 +167,21 @@ def advise(source, inputs: Path | None, tolerance: float) -> Advice:
                 good.append(choice)
     if not good:
         least = min([choice.error for choice in tried] + [error for _, error in search.models if error > tolerance])
-        raise SceneError(f"{source.file}: tolerance {tolerance:g} is out of reach; the least error found is "
-                         f"{least:.2g}")
+        raise SceneError(
+            f"{source.file}: tolerance {tolerance:g} is out of reach; the least error found is {least:.2g}"
+        )
     good.sort(key=lambda choice: choice.cost)
     # among the cheapest the simplest, in the order they were tried
     best = next(choice for choice in tried if choice in good and choice.cost <= ALIKE * good[0].cost)
-    return Advice(tolerance, best, [choice for choice in good if choice is not best], search.models, ratio,
-                  search.limit(best))
+    return Advice(
+        tolerance, best, [choice for choice in good if choice is not best], search.models, ratio, search.limit(best)
+    )
 
 
 def mass_ratio(source) -> float:
     """Largest eigenvalue of (host's mass)^-1 (mass that the tie adds), THEORY 5; inf where a host node has none."""
     from .study.variants import Variant
+
     scene = source.build(Variant())
     nodes, simulation = scene.model.report()["nodes"], scene.simulation()
     simulation.initialise(0.0)
@@ -192,17 +218,24 @@ class Search:
     def __init__(self, source, signals, tolerance: float, ratio: float):
         from .study import reference
         from .study.variants import Variant, compiles
+
         self.source, self.signals, self.tolerance, self.ratio = source, signals, tolerance, ratio
         self.prepare()
         small = max(1e-11, 1e-4 * tolerance)
         self.reference, error = reference.solve(self.exact_run(Variant()), small)
         if error[0] > 0.1 * tolerance:
-            raise SceneError(f"{source.file}: tolerance {tolerance:g} is out of reach; the reference itself is "
-                             f"only good to {error[0]:.2g}")
+            raise SceneError(
+                f"{source.file}: tolerance {tolerance:g} is out of reach; the reference itself is "
+                f"only good to {error[0]:.2g}"
+            )
         self.models = []
         rotations = ["translations", "all"] if len(source.scene.rotations) else ["all"]
-        for variant in [Variant(inertia, geometry, freedoms=freedoms) for freedoms in rotations
-                        for geometry in ("small", "finite") for inertia in ("lumped", "consistent")]:
+        for variant in [
+            Variant(inertia, geometry, freedoms=freedoms)
+            for freedoms in rotations
+            for geometry in ("small", "finite")
+            for inertia in ("lumped", "consistent")
+        ]:
             if compiles(source, variant):
                 own = reference.solve(self.exact_run(variant), max(1e-10, 1e-2 * tolerance))[0]
                 v, f, _ = own.difference(self.reference)
@@ -229,9 +262,13 @@ class Search:
             else:
                 bad, bad_error = middle, self.total(errors)
         passed = self.total(good_errors) <= self.tolerance
-        return make(step=run.interval / good, error_v=good_errors[0], error_f=good_errors[1],
-                    cost=run.cost(good)[0] if passed else np.inf,
-                    coarser=(run.interval / bad, bad_error) if bad else (np.nan, np.nan))
+        return make(
+            step=run.interval / good,
+            error_v=good_errors[0],
+            error_f=good_errors[1],
+            cost=run.cost(good)[0] if passed else np.inf,
+            coarser=(run.interval / bad, bad_error) if bad else (np.nan, np.nan),
+        )
 
     def errors(self, run, steps: int) -> tuple[float, float]:
         try:
@@ -243,11 +280,13 @@ class Search:
 class FreeSearch(Search):
     def prepare(self):
         from .study.speed_accuracy import intervals
+
         self.edges = intervals(self.source, self.signals)
         self.intervals = len(self.edges) - 1
 
     def run(self, variant, method):
         from .study.motion import FreeRun
+
         return FreeRun(self.source.build(variant, method, heavy=True), self.signals, self.edges)
 
     def exact_run(self, variant):
@@ -255,6 +294,7 @@ class FreeSearch(Search):
 
     def methods(self, variant):
         from .study.variants import METHODS
+
         reaction = "full" if np.isnan(self.ratio) else "loads" if variant.inertia == "lumped" else "split"
         return [(method, reaction) for method in METHODS]
 
@@ -273,17 +313,21 @@ class FreeSearch(Search):
 class DrivenSearch(Search):
     def prepare(self):
         from .study.driven import SAMPLES
+
         if not self.signals.values:
-            raise SceneError(f"{self.source.file}: every master is driven and there is no input to drive it; give "
-                             "--input CSV")
+            raise SceneError(
+                f"{self.source.file}: every master is driven and there is no input to drive it; give --input CSV"
+            )
         self.intervals = SAMPLES
 
     def exact_run(self, variant):
         from .study.driven import HeavyRun
+
         return HeavyRun(self.source.build(variant, "rk4", heavy=True), self.signals)
 
     def methods(self, variant):
         from .study.driven import METHODS
+
         reactions = ["loads"] if variant.inertia == "lumped" else ["split"]
         return [(method, reaction) for reaction in reactions for method in METHODS]
 
@@ -292,6 +336,7 @@ class DrivenSearch(Search):
 
     def largest_step(self, variant, method, reaction) -> Choice:
         from .study.driven import DrivenRun
+
         run = DrivenRun(self.source.build(variant, reaction=reaction), self.signals, reaction, method)
         return self.refined(run, 1, lambda **found: Choice(variant, method, reaction, **found))
 
@@ -301,6 +346,7 @@ def written(source, advice: Advice, options) -> str:
     import os
 
     from .study import toml
+
     c = advice.choice
     tables = source.changed(c.variant)
     if source.any_driven:

@@ -38,40 +38,57 @@ def fail(message: str) -> int:
 
 def parser() -> argparse.ArgumentParser:
     top = argparse.ArgumentParser(
-        prog="tiefmu", description="Puts the tied interface of an explicit crash code into an FMI 2.0 co-simulation "
-        "FMU. A scene is a TOML file; see scenes/ for examples.")
+        prog="tiefmu",
+        description="Puts the tied interface of an explicit crash code into an FMI 2.0 co-simulation "
+        "FMU. A scene is a TOML file; see scenes/ for examples.",
+    )
     top.add_argument("--version", action="version", version=f"tiefmu {__version__}")
     commands = top.add_subparsers(required=True, metavar="COMMAND")
 
-    build = commands.add_parser("build", help="write the FMU of a scene",
-                                description="Reads, checks and searches the scene and writes its FMU.")
+    build = commands.add_parser(
+        "build", help="write the FMU of a scene", description="Reads, checks and searches the scene and writes its FMU."
+    )
     build.add_argument("scene", metavar="SCENE", help="scene file (TOML)")
-    build.add_argument("-o", "--output", metavar="FMU", type=Path,
-                       help="file to write (default: name of the scene + .fmu, in the current folder)")
+    build.add_argument(
+        "-o",
+        "--output",
+        metavar="FMU",
+        type=Path,
+        help="file to write (default: name of the scene + .fmu, in the current folder)",
+    )
     build.set_defaults(command=run_build)
 
-    info = commands.add_parser("info", help="report how the slaves are tied, limits, what was left out",
-                               description="Prints the tie report of a scene, or the one that an FMU carries.")
+    info = commands.add_parser(
+        "info",
+        help="report how the slaves are tied, limits, what was left out",
+        description="Prints the tie report of a scene, or the one that an FMU carries.",
+    )
     info.add_argument("model", metavar="SCENE-or-FMU", help="scene file (TOML) or FMU made by tiefmu")
     info.add_argument("--json", action="store_true", help="the whole report as JSON")
     info.set_defaults(command=run_info)
 
     run = commands.add_parser(
-        "run", help="co-simulate a scene or an FMU with FMPy",
+        "run",
+        help="co-simulate a scene or an FMU with FMPy",
         description="Co-simulates with FMPy. CSV columns are `time` (s) and variable names such as slave[1].f[3], SI "
-        "units; inputs without a column keep their start value, and are linear between the rows.")
+        "units; inputs without a column keep their start value, and are linear between the rows.",
+    )
     run.add_argument("model", metavar="SCENE-or-FMU", help="scene file (TOML) or FMU")
     run.add_argument("--stop-time", metavar="T", type=positive, help="end, s (default: of the input, or of the FMU)")
-    run.add_argument("--step", metavar="H", type=positive, help="communication step, s (default: the FMU's, "
-                     "but at least 500 steps)")
+    run.add_argument(
+        "--step", metavar="H", type=positive, help="communication step, s (default: the FMU's, but at least 500 steps)"
+    )
     run.add_argument("--input", metavar="CSV", type=Path, help="inputs over time")
     run.add_argument("--output", metavar="CSV", type=Path, help="file to write the outputs to")
     run.add_argument("--plot", metavar="PNG", type=Path, help="file to draw the outputs to")
     run.set_defaults(command=run_run)
 
-    demo = commands.add_parser("demo", help="build and run the example scenes",
-                               description="Builds the example scenes, runs each as an FMU, prints a summary, writes "
-                               "FMUs, CSVs and pictures. Inputs come from NAME.csv beside NAME.toml.")
+    demo = commands.add_parser(
+        "demo",
+        help="build and run the example scenes",
+        description="Builds the example scenes, runs each as an FMU, prints a summary, writes "
+        "FMUs, CSVs and pictures. Inputs come from NAME.csv beside NAME.toml.",
+    )
     demo.add_argument("--out", metavar="DIR", type=Path, default=Path("out"), help="folder to write to (default: out)")
     demo.add_argument("--scenes", metavar="DIR", type=Path, help="folder of the scenes (default: of the checkout)")
     demo.set_defaults(command=run_demo)
@@ -104,10 +121,12 @@ def existing(name: str) -> Path:
 
 # Imports below are where they are needed: a command that fails early, or only asks for help, should be quick.
 
+
 def run_build(options):
     from .package import build
     from .report import report, summary
     from .scene import load
+
     scene = load(options.scene)
     fmu = build(scene, options.output or Path(f"{scene.name}.fmu"))
     found = report(scene)
@@ -118,10 +137,12 @@ def run_build(options):
 
 def run_info(options):
     from .report import of_fmu, report, text
+
     if is_fmu(options.model):
         found = of_fmu(existing(options.model))
     else:
         from .scene import load
+
         found = report(load(options.model))
     if options.json:
         json.dump(found, sys.stdout, allow_nan=False)
@@ -132,6 +153,7 @@ def run_info(options):
 
 def run_run(options):
     from .run import run, write_outputs
+
     for path in (options.output, options.plot):
         if path and not path.parent.is_dir():
             raise SceneError(f"{path}: folder {path.parent} does not exist")
@@ -141,6 +163,7 @@ def run_run(options):
         else:
             from .package import build
             from .scene import load
+
             scene = load(options.model)
             fmu = build(scene, Path(folder) / f"{scene.name}.fmu")
         result = run(fmu, options.stop_time, options.step, options.input, name=options.model)
@@ -148,20 +171,26 @@ def run_run(options):
         write_outputs(result, options.output)
     if options.plot:
         from .plot import plot
+
         plot(result, options.plot, Path(options.model).stem)
     outputs = result.dtype.names[1:]
-    print(f"{options.model}: {len(result) - 1} steps to t = {result['time'][-1]:g} s, {len(outputs)} outputs"
-          + "".join(f", wrote {path}" for path in (options.output, options.plot) if path))
+    print(
+        f"{options.model}: {len(result) - 1} steps to t = {result['time'][-1]:g} s, {len(outputs)} outputs"
+        + "".join(f", wrote {path}" for path in (options.output, options.plot) if path)
+    )
     if not options.output and not options.plot:
         for name in outputs[:20]:
-            print(f"  {name:<24} from {result[name].min():<12.6g} to {result[name].max():<12.6g} "
-                  f"at the end {result[name][-1]:.6g}")
+            print(
+                f"  {name:<24} from {result[name].min():<12.6g} to {result[name].max():<12.6g} "
+                f"at the end {result[name][-1]:.6g}"
+            )
         if len(outputs) > 20:
             print(f"  ... and {len(outputs) - 20} more (--output writes all)")
 
 
 def run_demo(options):
     from .demo import SCENES, demo
+
     return 0 if demo(options.out, options.scenes or SCENES) else 1
 
 

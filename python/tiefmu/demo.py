@@ -19,6 +19,7 @@ SCENES = Path(__file__).resolve().parents[2] / "scenes"  # of the checkout
 @dataclass
 class Check:
     """Something that must hold: `name` value (limit)."""
+
     name: str
     value: float
     limit: float
@@ -37,8 +38,10 @@ def demo(out: Path, scenes: Path = SCENES) -> bool:
     if not paths:
         raise SceneError(f"{scenes}: no scenes here; give the folder with --scenes")
     out.mkdir(parents=True, exist_ok=True)
-    print(f"{'scene':<22} {'slaves':>7} {'masters':>7} {'variables':>9} {'steps':>6} {'t end [s]':>10} {'build':>7} "
-          f"{'run':>7}  checks")
+    print(
+        f"{'scene':<22} {'slaves':>7} {'masters':>7} {'variables':>9} {'steps':>6} {'t end [s]':>10} {'build':>7} "
+        f"{'run':>7}  checks"
+    )
     held = True
     for path in paths:
         began = time.perf_counter()
@@ -53,11 +56,15 @@ def demo(out: Path, scenes: Path = SCENES) -> bool:
         found = report(scene)
         checks = check(result)
         held = held and all(one.held for one in checks)
-        print(f"{path.stem:<22} {len(found['slaves']):>7} {len(found['masters']):>7} "
-              f"{sum(found['variables'].values()):>9} {len(result) - 1:>6} {result['time'][-1]:>10.4g} "
-              f"{built - began:>6.2f}s {ran - built:>6.2f}s  "
-              + ", ".join(f"{one.name} {one.value:.1e}{'' if one.held else f' FAILED (limit {one.limit:.0e})'}"
-                          for one in checks), flush=True)
+        print(
+            f"{path.stem:<22} {len(found['slaves']):>7} {len(found['masters']):>7} "
+            f"{sum(found['variables'].values()):>9} {len(result) - 1:>6} {result['time'][-1]:>10.4g} "
+            f"{built - began:>6.2f}s {ran - built:>6.2f}s  "
+            + ", ".join(
+                f"{one.name} {one.value:.1e}{'' if one.held else f' FAILED (limit {one.limit:.0e})'}" for one in checks
+            ),
+            flush=True,
+        )
     print(f"{'all checks held' if held else 'A CHECK FAILED'}; FMUs, results and pictures are in {out}")
     return held
 

@@ -6,7 +6,7 @@ from .extras_picture import Picture
 from .report import counted, step, summary
 from .scene import Scene
 
-SHOWN = 200        # rows of a table; resources/report.json has all
+SHOWN = 200  # rows of a table; resources/report.json has all
 MOST_DRAWN = 2000  # segments and slaves in a drawing; beyond that the page shows model.png
 
 STYLE = """body { font-family: sans-serif; max-width: 60em; margin: 2em auto; padding: 0 1em; line-height: 1.4 }
@@ -35,11 +35,11 @@ loads.</li>
 
 REACTIONS = {
     "loads": "The reaction is the slaves' load alone: the host carries a driven master's own mass and "
-             "<code>added_mass</code> (and inertia).",
+    "<code>added_mass</code> (and inertia).",
     "full": "The reaction holds the slaves' inertia: the host carries a driven master's own mass only. Stable with a "
-            "held force only while the tied mass is below the host's.",
+    "held force only while the tied mass is below the host's.",
     "split": "The reaction is the full one plus the added inertia times the acceleration: the host carries own and "
-             "added mass. Stable for every mass ratio.",
+    "added mass. Stable for every mass ratio.",
 }
 
 
@@ -47,47 +47,100 @@ def page(scene: Scene, found: dict, picture: Picture) -> bytes:
     """found: the scene's report."""
     title, ports = escape(scene.title or scene.name), found.get("ports", [])
     small = len(picture.segments) + len(found["slaves"]) <= MOST_DRAWN
-    parts = [f'<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8"><title>{title}</title>'
-             f"<style>{STYLE}</style></head><body>\n<h1>{title}</h1>\n",
-             f"<p>A tied interface as an FMI 2.0 co-simulation FMU: {escape(summary(found))}.</p>\n",
-             picture.svg() if small else '<p><img src="../model.png" alt="the scene"></p>', "\n<h2>Ties</h2>\n",
-             table("", ["tie", "formulation", "search", "distance [m]", "segments", "slaves"],
-                   [[row["name"], row["formulation"], row["search"], row["search_distance"], row["segments"],
-                     row["slaves"]] for row in found["ties"]]),
-             table("Slaves: the segment each is tied to, its projection there, the length of its offset and the weights "
-                   "of the segment's nodes.",
-                   ["slave j", "node", "tie", "segment", "xi", "eta", "d [m]", "nodes", "weights"],
-                   [[row["number"], row["id"], row["tie"], row["segment"], row["xi"], row["eta"], row["d"],
-                     " ".join(map(str, row["nodes"])), " ".join(f"{w:.4g}" for w in row["weights"])]
-                    for row in found["slaves"][:SHOWN]], len(found["slaves"])),
-             table("Masters: who moves them, their own mass and what the tie adds.",
-                   ["master i", "node", "motion", "rotations", "mass [kg]", "added mass [kg]", "added inertia [kg m2]"],
-                   [[row["number"], row["id"], row["motion"], "yes" if row["rotations"] else "no", row["mass"],
-                     row["added_mass"], row["added_inertia"]] for row in found["masters"][:SHOWN]],
-                   len(found["masters"])),
-             table("Ports: nodes that the interface shows as one rigid body. Added: what the tie adds to a port of "
-                   "driven nodes, with the centre of that mass and its moments and products of inertia about it (xx, "
-                   "yy, zz, yz, zx, xy), at the start.",
-                   ["port", "nodes", "reference point [m]", "added mass [kg]", "centre [m]", "inertia [kg m2]"],
-                   [[row["name"], counted(len(row["nodes"]), "slave" if row["moves"] == "slaves" else "driven node"),
-                     numbers(row["at"]), row.get("added_mass", ""), numbers(row.get("added_centre", [])),
-                     numbers(row.get("added_inertia", []))] for row in ports[:SHOWN]], len(ports)),
-             CONVENTIONS, "<h2>Settings</h2><ul>\n"]
+    parts = [
+        f'<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8"><title>{title}</title>'
+        f"<style>{STYLE}</style></head><body>\n<h1>{title}</h1>\n",
+        f"<p>A tied interface as an FMI 2.0 co-simulation FMU: {escape(summary(found))}.</p>\n",
+        picture.svg() if small else '<p><img src="../model.png" alt="the scene"></p>',
+        "\n<h2>Ties</h2>\n",
+        table(
+            "",
+            ["tie", "formulation", "search", "distance [m]", "segments", "slaves"],
+            [
+                [row["name"], row["formulation"], row["search"], row["search_distance"], row["segments"], row["slaves"]]
+                for row in found["ties"]
+            ],
+        ),
+        table(
+            "Slaves: the segment each is tied to, its projection there, the length of its offset and the weights "
+            "of the segment's nodes.",
+            ["slave j", "node", "tie", "segment", "xi", "eta", "d [m]", "nodes", "weights"],
+            [
+                [
+                    row["number"],
+                    row["id"],
+                    row["tie"],
+                    row["segment"],
+                    row["xi"],
+                    row["eta"],
+                    row["d"],
+                    " ".join(map(str, row["nodes"])),
+                    " ".join(f"{w:.4g}" for w in row["weights"]),
+                ]
+                for row in found["slaves"][:SHOWN]
+            ],
+            len(found["slaves"]),
+        ),
+        table(
+            "Masters: who moves them, their own mass and what the tie adds.",
+            ["master i", "node", "motion", "rotations", "mass [kg]", "added mass [kg]", "added inertia [kg m2]"],
+            [
+                [
+                    row["number"],
+                    row["id"],
+                    row["motion"],
+                    "yes" if row["rotations"] else "no",
+                    row["mass"],
+                    row["added_mass"],
+                    row["added_inertia"],
+                ]
+                for row in found["masters"][:SHOWN]
+            ],
+            len(found["masters"]),
+        ),
+        table(
+            "Ports: nodes that the interface shows as one rigid body. Added: what the tie adds to a port of "
+            "driven nodes, with the centre of that mass and its moments and products of inertia about it (xx, "
+            "yy, zz, yz, zx, xy), at the start.",
+            ["port", "nodes", "reference point [m]", "added mass [kg]", "centre [m]", "inertia [kg m2]"],
+            [
+                [
+                    row["name"],
+                    counted(len(row["nodes"]), "slave" if row["moves"] == "slaves" else "driven node"),
+                    numbers(row["at"]),
+                    row.get("added_mass", ""),
+                    numbers(row.get("added_centre", [])),
+                    numbers(row.get("added_inertia", [])),
+                ]
+                for row in ports[:SHOWN]
+            ],
+            len(ports),
+        ),
+        CONVENTIONS,
+        "<h2>Settings</h2><ul>\n",
+    ]
     settings = scene.settings
-    parts += [f"<li>{REACTIONS[settings.reaction]}</li>\n",
-              f"<li>Inertia: {settings.inertia}; geometry: {settings.geometry}; positions of driven nodes: "
-              f"{settings.position}.</li>\n"]
+    parts += [
+        f"<li>{REACTIONS[settings.reaction]}</li>\n",
+        f"<li>Inertia: {settings.inertia}; geometry: {settings.geometry}; positions of driven nodes: "
+        f"{settings.position}.</li>\n",
+    ]
     if any(row["motion"] == "free" for row in found["masters"] + found["points"]):
-        parts.append(f"<li>Stable step: {step(found['stable_time_step'])}, nodal step: "
-                     f"{step(found['nodal_time_step'])}. A communication step is divided into as many substeps as the "
-                     "limit asks.</li>\n")
+        parts.append(
+            f"<li>Stable step: {step(found['stable_time_step'])}, nodal step: "
+            f"{step(found['nodal_time_step'])}. A communication step is divided into as many substeps as the "
+            "limit asks.</li>\n"
+        )
     if ports:
         parts.append(PORTS)
     parts.append("</ul>\n")
     for key in ("warnings", "notes"):
         if found[key]:
-            parts.append(f"<h2>{key.capitalize()}</h2><ul>"
-                         + "".join(f"<li>{escape(line)}</li>" for line in found[key][:SHOWN]) + "</ul>\n")
+            parts.append(
+                f"<h2>{key.capitalize()}</h2><ul>"
+                + "".join(f"<li>{escape(line)}</li>" for line in found[key][:SHOWN])
+                + "</ul>\n"
+            )
     parts.append('<p><a href="licenses/license.txt">Licences</a></p>\n</body></html>\n')
     return "".join(parts).encode()
 
@@ -102,8 +155,11 @@ def table(caption: str, header: list[str], rows: list[list], total: int | None =
     if total and total > len(rows):
         caption += f" The first {len(rows)} of {total}; resources/report.json has all."
     body = "".join("<tr>" + "".join(f"<td>{cell(value)}</td>" for value in row) + "</tr>\n" for row in rows)
-    return (f"<table><caption>{caption}</caption><thead><tr>"
-            + "".join(f"<th>{name}</th>" for name in header) + f"</tr></thead><tbody>\n{body}</tbody></table>\n")
+    return (
+        f"<table><caption>{caption}</caption><thead><tr>"
+        + "".join(f"<th>{name}</th>" for name in header)
+        + f"</tr></thead><tbody>\n{body}</tbody></table>\n"
+    )
 
 
 def cell(value) -> str:

@@ -8,8 +8,8 @@ import zlib
 
 import numpy as np
 
-LABELLED = 30   # nodes: with more of them ids would hide the picture
-FILLED = 2000   # segments: with more of them a PNG has their edges only
+LABELLED = 30  # nodes: with more of them ids would hide the picture
+FILLED = 2000  # segments: with more of them a PNG has their edges only
 WIDTH, HEIGHT, MARGIN = 480, 360, 24
 FACE, EDGE, SLAVE = "#dde8f2", "#445566", "#bb4400"
 COLOURS = ["#ffffff", FACE, EDGE, SLAVE]
@@ -43,16 +43,22 @@ class Picture:
 
     def svg(self) -> str:
         """An <svg> element; ids are written beside the nodes where they are few."""
+
         def point(p):
             return f"{p[0]:.1f} {p[1]:.1f}"
-        parts = [f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {HEIGHT}" width="{WIDTH}" '
-                 f'height="{HEIGHT}" font-family="sans-serif" font-size="11">',
-                 f'<g fill="{FACE}" stroke="{EDGE}" fill-opacity="0.8">']
+
+        parts = [
+            f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {HEIGHT}" width="{WIDTH}" '
+            f'height="{HEIGHT}" font-family="sans-serif" font-size="11">',
+            f'<g fill="{FACE}" stroke="{EDGE}" fill-opacity="0.8">',
+        ]
         parts += ['<path d="M' + " L".join(map(point, corners)) + ' z"/>' for corners in self.segments]
         parts.append(f'</g><g stroke="{SLAVE}" stroke-dasharray="4 3">')
         parts += [f'<path d="M{point(a)} L{point(b)}"/>' for a, b in zip(self.feet, self.slaves)]
-        for colour, radius, points, ids in ((EDGE, 3, self.masters, self.labels),
-                                            (SLAVE, 4, self.slaves, self.slave_labels)):
+        for colour, radius, points, ids in (
+            (EDGE, 3, self.masters, self.labels),
+            (SLAVE, 4, self.slaves, self.slave_labels),
+        ):
             parts.append(f'</g><g fill="{colour}">')
             parts += [f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{radius}"/>' for x, y in points]
             if len(self.labels) + len(self.slave_labels) <= LABELLED:
@@ -66,14 +72,15 @@ class Picture:
         if len(segments) <= FILLED:
             for corners in segments:
                 fill(canvas, corners, COLOURS.index(FACE))
-        edges = np.vstack([np.hstack([corners, np.roll(corners, -1, axis=0)]) for corners in segments]
-                          or [np.zeros((0, 4))])
+        edges = np.vstack(
+            [np.hstack([corners, np.roll(corners, -1, axis=0)]) for corners in segments] or [np.zeros((0, 4))]
+        )
         many = len(self.slaves) + len(self.masters) > LABELLED
         lines(canvas, edges[:, :2], edges[:, 2:], COLOURS.index(EDGE), 1)
         lines(canvas, self.feet * 2, self.slaves * 2, COLOURS.index(SLAVE), 1)
         lines(canvas, self.masters * 2, self.masters * 2, COLOURS.index(EDGE), 2 if many else 5)
         lines(canvas, self.slaves * 2, self.slaves * 2, COLOURS.index(SLAVE), 2 if many else 6)
-        palette = np.array([[int(colour[k:k + 2], 16) for k in (1, 3, 5)] for colour in COLOURS], np.uint16)
+        palette = np.array([[int(colour[k : k + 2], 16) for k in (1, 3, 5)] for colour in COLOURS], np.uint16)
         quarters = [palette[canvas[i::2, j::2]] for i in (0, 1) for j in (0, 1)]
         return png((sum(quarters) // 4).astype(np.uint8))
 
@@ -96,7 +103,7 @@ def fill(canvas: np.ndarray, corners: np.ndarray, colour: int):
     """A convex polygon: pixels on the same side of every edge."""
     low = np.maximum(np.floor(corners.min(axis=0)).astype(int), 0)
     high = np.ceil(corners.max(axis=0)).astype(int) + 1
-    part = canvas[low[1]:high[1], low[0]:high[0]]
+    part = canvas[low[1] : high[1], low[0] : high[0]]
     y, x = low[1] + np.arange(part.shape[0])[:, None], low[0] + np.arange(part.shape[1])
     left, right = np.ones(part.shape, bool), np.ones(part.shape, bool)
     for a, b in zip(corners, np.roll(corners, -1, axis=0)):
@@ -126,6 +133,11 @@ def png(pixels: np.ndarray) -> bytes:
 
     def chunk(kind: bytes, data: bytes) -> bytes:
         return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
     rows = np.hstack([np.zeros((height, 1), np.uint8), pixels.reshape(height, -1)]).tobytes()  # 0: unfiltered
-    return (b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0))
-            + chunk(b"IDAT", zlib.compress(rows, 3)) + chunk(b"IEND", b""))
+    return (
+        b"\x89PNG\r\n\x1a\n"
+        + chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0))
+        + chunk(b"IDAT", zlib.compress(rows, 3))
+        + chunk(b"IEND", b"")
+    )

@@ -35,8 +35,10 @@ def reference(scene: Scene, step: float) -> dict[str, bytes]:
                 answer = simulation.get_values(outputs)
     except RuntimeError:  # Diverged, or more substeps than any run could make
         return {}
-    return {f"{FOLDER}/reference_in.csv": table(times, list(inputs), np.array(list(inputs.values())).T),
-            f"{FOLDER}/reference_out.csv": table(times, outputs, np.array(rows))}
+    return {
+        f"{FOLDER}/reference_in.csv": table(times, list(inputs), np.array(list(inputs.values())).T),
+        f"{FOLDER}/reference_out.csv": table(times, outputs, np.array(rows)),
+    }
 
 
 def names(block: dict) -> list[str]:
@@ -45,8 +47,11 @@ def names(block: dict) -> list[str]:
     components = [f"[{k}]" for k in (1, 2, 3)] if block["components"] == 3 else [""]
     if not block["prefix"]:
         return [block["name"]]
-    return [f"{block['prefix']}[{number}].{name}{k}" for number in block["labels"] or block["numbers"].tolist()
-            for k in components]
+    return [
+        f"{block['prefix']}[{number}].{name}{k}"
+        for number in block["labels"] or block["numbers"].tolist()
+        for k in components
+    ]
 
 
 def signals(scene: Scene, times: np.ndarray) -> dict[str, np.ndarray]:
@@ -57,8 +62,15 @@ def signals(scene: Scene, times: np.ndarray) -> dict[str, np.ndarray]:
     mass = float(np.append(nodes["mass"], slaves["mass"]).mean())
     omega = 2 * math.pi / times[-1]
     force = mass * TRAVEL * size * omega**2 or 1.0
-    amplitude = {"r": TRAVEL * size, "v": TRAVEL * size * omega, "a": TRAVEL * size * omega**2,
-                 "w": TRAVEL * omega, "z": TRAVEL * omega**2, "f": force, "t": force * size}
+    amplitude = {
+        "r": TRAVEL * size,
+        "v": TRAVEL * size * omega,
+        "a": TRAVEL * size * omega**2,
+        "w": TRAVEL * omega,
+        "z": TRAVEL * omega**2,
+        "f": force,
+        "t": force * size,
+    }
     found = {}
     for block in scene.start.variables:
         if block["causality"] != "input":

@@ -14,8 +14,10 @@ def terminals(scene: Scene) -> bytes:
             continue
         short = block["name"].removeprefix(prefix + ".")
         names = [f"{short}[{k}]" for k in (1, 2, 3)] if block["components"] == 3 else [short]
-        lines = "".join(f'<TerminalMemberVariable variableName="{prefix}[#].{name}" memberName="{name}" '
-                        'variableKind="signal"/>\n' for name in names)
+        lines = "".join(
+            f'<TerminalMemberVariable variableName="{prefix}[#].{name}" memberName="{name}" variableKind="signal"/>\n'
+            for name in names
+        )
         for place, node in zip(block["labels"] or block["numbers"].tolist(), block["ids"].tolist()):
             members.setdefault((prefix, place), []).append(lines)
             ids[prefix, place] = node

@@ -27,6 +27,7 @@ CORNERS = {"triangle": 3, "quad": 4}
 class Mesh:
     """Positions are in the units of the file; node indices in `segments` (n, 4), a triangle's fourth is -1;
     sets: name -> sorted indices of nodes or of segments."""
+
     node_id: np.ndarray = field(default_factory=lambda: np.empty(0, np.int64))
     position: np.ndarray = field(default_factory=lambda: np.empty((0, 3)))
     segment_id: np.ndarray = field(default_factory=lambda: np.empty(0, np.int64))
@@ -98,8 +99,9 @@ def build(table, folder: Path) -> Mesh:
         if not len(mesh.node_id):
             raise SceneError("has no nodes; give nodes = [[id, x, y, z], ...] or file")
         if table.segments:
-            mesh.add_segments([row[0] for row in table.segments],
-                              [row[1:] + [0] * (5 - len(row)) for row in table.segments])
+            mesh.add_segments(
+                [row[0] for row in table.segments], [row[1:] + [0] * (5 - len(row)) for row in table.segments]
+            )
     except SceneError as error:
         raise SceneError(f"mesh: {error}") from None
     return mesh
@@ -165,7 +167,7 @@ def read_meshio(mesh: Mesh, path: Path, name: str):
     if read.points.ndim != 2 or not 1 <= read.points.shape[1] <= 3:
         raise SceneError("meshio cannot read it: its points have no coordinates x, y, z")
     position = np.zeros((len(read.points), 3))
-    position[:, :read.points.shape[1]] = read.points[:, :3]
+    position[:, : read.points.shape[1]] = read.points[:, :3]
     counts = {kind: sum(len(block.data) for block in read.cells if block.type == kind) for kind in CORNERS}
 
     tags = gmsh_tags(path, len(position), counts)
@@ -187,7 +189,7 @@ def read_meshio(mesh: Mesh, path: Path, name: str):
         nodes[:, :corners] = mesh.node_id[block.data]
         rows.append(nodes)
         start = taken[block.type]
-        ids.append(np.arange(total + 1, total + n + 1) if tags[1] is None else tags[1][block.type][start:start + n])
+        ids.append(np.arange(total + 1, total + n + 1) if tags[1] is None else tags[1][block.type][start : start + n])
         taken[block.type] += n
         total += n
     if total:
@@ -214,8 +216,10 @@ def element_sets(read) -> dict[str, list]:
     for name, value in read.field_data.items():
         if physical is not None and name not in sets and len(value) == 2:
             tag, dimension = value
-            sets[name] = [np.flatnonzero(numbers == tag) if block.dim == dimension else None
-                          for block, numbers in zip(read.cells, physical)]
+            sets[name] = [
+                np.flatnonzero(numbers == tag) if block.dim == dimension else None
+                for block, numbers in zip(read.cells, physical)
+            ]
     return sets
 
 
@@ -246,9 +250,9 @@ GMSH_TYPES = {2: "triangle", 3: "quad"}
 
 
 def tags_of_version_2(lines: list[bytes], nodes: int, elements: int):
-    node_tags = [int(line.split(None, 1)[0]) for line in lines[nodes + 1:nodes + 1 + int(lines[nodes])]]
+    node_tags = [int(line.split(None, 1)[0]) for line in lines[nodes + 1 : nodes + 1 + int(lines[nodes])]]
     element_tags = {kind: [] for kind in CORNERS}
-    for line in lines[elements + 1:elements + 1 + int(lines[elements])]:
+    for line in lines[elements + 1 : elements + 1 + int(lines[elements])]:
         tag, kind = map(int, line.split(None, 2)[:2])
         if kind in GMSH_TYPES:
             element_tags[GMSH_TYPES[kind]].append(tag)
@@ -260,12 +264,12 @@ def tags_of_version_4(lines: list[bytes], nodes: int, elements: int):
     line = nodes + 1
     for _ in range(int(lines[nodes].split()[0])):
         count = int(lines[line].split()[3])
-        node_tags += map(int, lines[line + 1:line + 1 + count])
+        node_tags += map(int, lines[line + 1 : line + 1 + count])
         line += 1 + 2 * count
     line = elements + 1
     for _ in range(int(lines[elements].split()[0])):
         _, _, kind, count = map(int, lines[line].split())
         if kind in GMSH_TYPES:
-            element_tags[GMSH_TYPES[kind]] += [int(row.split(None, 1)[0]) for row in lines[line + 1:line + 1 + count]]
+            element_tags[GMSH_TYPES[kind]] += [int(row.split(None, 1)[0]) for row in lines[line + 1 : line + 1 + count]]
         line += 1 + count
     return node_tags, element_tags

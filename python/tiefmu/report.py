@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from .scene import MOTIONS, Scene
 from ._core import SceneError
+from .scene import MOTIONS, Scene
 
 MANY_VARIABLES = 10_000  # importers read them in seconds, masters connect them in minutes
 SHOWN = 20  # slaves, masters, points and ids that the text shows; the dict has all
@@ -33,8 +33,9 @@ def report(scene: Scene) -> dict:
         "masters": node_rows(scene, nodes, master=True),
         "points": node_rows(scene, nodes, master=False),
         "springs": found["springs"],
-        "dropped": [{"id": number, "tie": scene.ties[tie].name, "reason": reason}
-                    for number, tie, reason in found["dropped"]],
+        "dropped": [
+            {"id": number, "tie": scene.ties[tie].name, "reason": reason} for number, tie, reason in found["dropped"]
+        ],
         "left_out": found["left_out"].tolist(),
         "warnings": found["warnings"] + size_warning(sum(variables.values())),
         "notes": [*scene.notes, *found["notes"]],
@@ -51,16 +52,23 @@ def ties(scene: Scene, found: dict) -> list[dict]:
     rows = []
     for number, (table, distance) in enumerate(zip(scene.ties, found["search_distance"])):
         own = slaves["tie"] == number
-        rows.append({"name": table.name, "formulation": table.formulation, "search": table.search,
-                     "search_distance": distance, "segments": len(np.unique(slaves["segment"][own])),
-                     "slaves": int(own.sum())})
+        rows.append(
+            {
+                "name": table.name,
+                "formulation": table.formulation,
+                "search": table.search,
+                "search_distance": distance,
+                "segments": len(np.unique(slaves["segment"][own])),
+                "slaves": int(own.sum()),
+            }
+        )
     return rows
 
 
 def slave_rows(scene: Scene, found: dict, order: np.ndarray) -> list[dict]:
     s = {key: value[order] for key, value in found["slaves"].items()}
     n, m, inertia = s["corners"], s["mass"], s["inertia"]
-    rotary = inertia + m * s["d"]**2  # I_s + m_s d^2
+    rotary = inertia + m * s["d"] ** 2  # I_s + m_s d^2
     optimized = s["coupling"] == found["couplings"].index("meanMotion")
     turns_masters = s["coupling"] == found["couplings"].index("rotation")
     # Lumped additions: seed (1), (2), and (7), (8) with lambda for the matrix.
@@ -68,21 +76,51 @@ def slave_rows(scene: Scene, found: dict, order: np.ndarray) -> list[dict]:
     share = np.where(optimized[:, None], corner / n[:, None], s["weights"])
     with np.errstate(invalid="ignore", over="ignore"):  # lambda may be infinite where no optimized tie uses it
         mean = m / n + rotary * s["lambda"]
-    added_mass = np.where(optimized[:, None], corner * np.where(optimized, mean, 0.0)[:, None],
-                          s["clamped_weights"] * m[:, None])
+    added_mass = np.where(
+        optimized[:, None], corner * np.where(optimized, mean, 0.0)[:, None], s["clamped_weights"] * m[:, None]
+    )
     added_inertia = np.where(turns_masters[:, None], s["clamped_weights"] * rotary[:, None], 0.0)
 
     names = [table.name for table in scene.ties]
-    columns = zip(s["id"].tolist(), s["number"].tolist(), s["tie"].tolist(), s["segment"].tolist(), s["xi"].tolist(),
-                  s["eta"].tolist(), s["distance"].tolist(), s["d"].tolist(), s["offset"].tolist(),
-                  s["nodes"].tolist(), share.tolist(), finite(s["cond"]), s["clamped"].tolist(), finite(s["lambda"]),
-                  added_mass.tolist(), added_inertia.tolist(), n.tolist())
-    return [{"id": number, "number": j, "tie": names[tie], "segment": segment, "xi": xi, "eta": eta,
-             "distance": distance, "d": d, "offset": offset, "nodes": corners[:k], "weights": weights[:k],
-             "cond": cond, "clamped": bool(clamped), "lambda": lambda_,
-             "added": [{"node": corners[i], "mass": masses[i], "inertia": inertias[i]} for i in range(k)]}
-            for number, j, tie, segment, xi, eta, distance, d, offset, corners, weights, cond, clamped, lambda_,
-            masses, inertias, k in columns]
+    columns = zip(
+        s["id"].tolist(),
+        s["number"].tolist(),
+        s["tie"].tolist(),
+        s["segment"].tolist(),
+        s["xi"].tolist(),
+        s["eta"].tolist(),
+        s["distance"].tolist(),
+        s["d"].tolist(),
+        s["offset"].tolist(),
+        s["nodes"].tolist(),
+        share.tolist(),
+        finite(s["cond"]),
+        s["clamped"].tolist(),
+        finite(s["lambda"]),
+        added_mass.tolist(),
+        added_inertia.tolist(),
+        n.tolist(),
+    )
+    return [
+        {
+            "id": number,
+            "number": j,
+            "tie": names[tie],
+            "segment": segment,
+            "xi": xi,
+            "eta": eta,
+            "distance": distance,
+            "d": d,
+            "offset": offset,
+            "nodes": corners[:k],
+            "weights": weights[:k],
+            "cond": cond,
+            "clamped": bool(clamped),
+            "lambda": lambda_,
+            "added": [{"node": corners[i], "mass": masses[i], "inertia": inertias[i]} for i in range(k)],
+        }
+        for number, j, tie, segment, xi, eta, distance, d, offset, corners, weights, cond, clamped, lambda_, masses, inertias, k in columns
+    ]
 
 
 def finite(values: np.ndarray) -> list:
@@ -99,9 +137,17 @@ def node_rows(scene: Scene, nodes: dict, master: bool) -> list[dict]:
         if bool(nodes["master"][i]) != master:
             continue
         mass = float(nodes["mass"][i])
-        row = {"id": int(nodes["id"][i]), "number": int(nodes["number"][i]), "motion": MOTIONS[nodes["motion"][i]],
-               "rotations": i < rotating, "mass": mass, "added_mass": float(added_mass[i]), "added_inertia": 0.0,
-               "stiffness": float(stiffness[i]), "rotational_stiffness": 0.0}
+        row = {
+            "id": int(nodes["id"][i]),
+            "number": int(nodes["number"][i]),
+            "motion": MOTIONS[nodes["motion"][i]],
+            "rotations": i < rotating,
+            "mass": mass,
+            "added_mass": float(added_mass[i]),
+            "added_inertia": 0.0,
+            "stiffness": float(stiffness[i]),
+            "rotational_stiffness": 0.0,
+        }
         steps = [nodal_step(mass + row["added_mass"], row["stiffness"])]
         if i < rotating:
             row["added_inertia"] = float(added_inertia[i])
@@ -120,26 +166,34 @@ def port_rows(scene: Scene, found: dict) -> list[dict]:
     index = dict(zip(nodes["id"].tolist(), range(len(nodes["id"]))))
     for port in sorted(found["ports"], key=lambda port: port["number"]):
         ids = np.sort(port["ids"])
-        row = {"name": port["name"], "moves": "slaves" if port["of_slaves"] else "driven nodes", "at": port["at"],
-               "nodes": ids.tolist()}
+        row = {
+            "name": port["name"],
+            "moves": "slaves" if port["of_slaves"] else "driven nodes",
+            "at": port["at"],
+            "nodes": ids.tolist(),
+        }
         if not port["of_slaves"]:
             own = np.array([index[i] for i in ids.tolist()])
             mass, position = added_mass[own], nodes["position"][own]
             total = float(mass.sum())
             centre = mass @ position / total if total > 0 else np.array(port["at"])
             arm = position - centre
-            tensor = np.einsum("n,nij->ij", mass, (arm**2).sum(axis=1)[:, None, None] * np.eye(3)
-                               - arm[:, :, None] * arm[:, None, :])
+            tensor = np.einsum(
+                "n,nij->ij", mass, (arm**2).sum(axis=1)[:, None, None] * np.eye(3) - arm[:, :, None] * arm[:, None, :]
+            )
             tensor += added_inertia[own[own < nodes["rotating"]]].sum() * np.eye(3)
-            row |= {"added_mass": total, "added_centre": centre.tolist(),
-                    "added_inertia": [float(tensor[i, j]) for i, j in ((0, 0), (1, 1), (2, 2), (1, 2), (2, 0), (0, 1))]}
+            row |= {
+                "added_mass": total,
+                "added_centre": centre.tolist(),
+                "added_inertia": [float(tensor[i, j]) for i, j in ((0, 0), (1, 1), (2, 2), (1, 2), (2, 0), (0, 1))],
+            }
         rows.append(row)
     return rows
 
 
 def nodal_step(mass: float, stiffness: float) -> float:
     """Seed (3): sqrt(2 m/K); 1e30 where nothing limits it."""
-    return (2 * mass / stiffness)**0.5 if stiffness > 0 else 1e30
+    return (2 * mass / stiffness) ** 0.5 if stiffness > 0 else 1e30
 
 
 def freedoms(scene: Scene, nodes: dict) -> dict:
@@ -149,8 +203,11 @@ def freedoms(scene: Scene, nodes: dict) -> dict:
     dropped = np.setdiff1d(np.intersect1d(scene.rotations, nodes["id"]), nodes["id"][rotating])
     left_out = [f"rotations of node {number}" for number in dropped.tolist()]
     left_out += [f"{MOTIONS[2]} node {number}" for number in np.sort(nodes["id"][~moving]).tolist()]
-    return {"translations": 3 * int(moving.sum()), "rotations": 3 * int((moving & rotating).sum()),
-            "left_out": left_out}
+    return {
+        "translations": 3 * int(moving.sum()),
+        "rotations": 3 * int((moving & rotating).sum()),
+        "left_out": left_out,
+    }
 
 
 def variable_counts(scene: Scene) -> dict:
@@ -163,8 +220,10 @@ def variable_counts(scene: Scene) -> dict:
 def size_warning(variables: int) -> list[str]:
     if variables <= MANY_VARIABLES:
         return []
-    return [f"interface: {variables} variables; many importers and masters take minutes over more than {MANY_VARIABLES}; "
-            "'ports' in [interface] makes the nodes of a set one rigid port of 12 variables"]
+    return [
+        f"interface: {variables} variables; many importers and masters take minutes over more than {MANY_VARIABLES}; "
+        "'ports' in [interface] makes the nodes of a set one rigid port of 12 variables"
+    ]
 
 
 def of_fmu(path: Path) -> dict:
@@ -185,23 +244,30 @@ def of_fmu(path: Path) -> dict:
 
 # ------------------------------------------------------------------------------------------------------------- as text
 
+
 def text(name: str, found: dict) -> str:
     """The report as people read it: at most SHOWN slaves, masters and points, and how many more there are."""
-    lines = [f"{name}: {found['title']}" if found["title"] else name,
-             summary(found), ""]
+    lines = [f"{name}: {found['title']}" if found["title"] else name, summary(found), ""]
     for tie in found["ties"]:
-        lines.append(f"tie '{tie['name']}': {tie['formulation']} formulation, search '{tie['search']}' within "
-                     f"{tie['search_distance']:.6g} m: {counted(tie['slaves'], 'slave')} on "
-                     f"{counted(tie['segments'], 'segment')}")
+        lines.append(
+            f"tie '{tie['name']}': {tie['formulation']} formulation, search '{tie['search']}' within "
+            f"{tie['search_distance']:.6g} m: {counted(tie['slaves'], 'slave')} on "
+            f"{counted(tie['segments'], 'segment')}"
+        )
     lines += ["", *slave_text(found["slaves"])]
     lines += node_text("master", found["masters"])
     lines += node_text("point", found["points"])
     lines += port_text(found.get("ports", []))
-    lines += ["steps", f"  stable  {step(found['stable_time_step'])}   2/omega_max of the assembled system",
-              f"  nodal   {step(found['nodal_time_step'])}   smallest sqrt(2 m/K) of the free nodes",
-              f"  method  {step(found['integrator_limit'])}   limit of the chosen integrator", ""]
-    lines.append(f"freedoms: {found['freedoms']['translations']} translations, "
-                 f"{found['freedoms']['rotations']} rotations")
+    lines += [
+        "steps",
+        f"  stable  {step(found['stable_time_step'])}   2/omega_max of the assembled system",
+        f"  nodal   {step(found['nodal_time_step'])}   smallest sqrt(2 m/K) of the free nodes",
+        f"  method  {step(found['integrator_limit'])}   limit of the chosen integrator",
+        "",
+    ]
+    lines.append(
+        f"freedoms: {found['freedoms']['translations']} translations, {found['freedoms']['rotations']} rotations"
+    )
     lines += listed("  left out: ", found["freedoms"]["left_out"])
     lines += listed("nodes that no tie and no spring uses, left out: ", found["left_out"])
     lines += [f"dropped: slave {row['id']} of tie '{row['tie']}': {row['reason']}" for row in found["dropped"][:SHOWN]]
@@ -212,31 +278,40 @@ def text(name: str, found: dict) -> str:
 
 
 def slave_text(slaves: list[dict]) -> list[str]:
-    header = f"{'slave':>9} {'j':>6} {'tie':<12} {'segment':>9} {'xi':>9} {'eta':>9} {'d [m]':>11} {'cond':>9}  " \
-             "weight -> master: added mass [kg], inertia [kg m2]"
+    header = (
+        f"{'slave':>9} {'j':>6} {'tie':<12} {'segment':>9} {'xi':>9} {'eta':>9} {'d [m]':>11} {'cond':>9}  "
+        "weight -> master: added mass [kg], inertia [kg m2]"
+    )
     lines = [header] if slaves else []
     for row in slaves[:SHOWN]:
         condition = "inf" if row["cond"] is None else f"{row['cond']:.3g}"
-        first = f"{row['id']:>9} {row['number']:>6} {row['tie'][:12]:<12} {row['segment']:>9} {row['xi']:>9.5f} " \
-                f"{row['eta']:>9.5f} {row['d']:>11.5g} {condition:>9}  "
+        first = (
+            f"{row['id']:>9} {row['number']:>6} {row['tie'][:12]:<12} {row['segment']:>9} {row['xi']:>9.5f} "
+            f"{row['eta']:>9.5f} {row['d']:>11.5g} {condition:>9}  "
+        )
         for weight, added in zip(row["weights"], row["added"]):
             lines.append(f"{first}{weight:>8.5f} -> {added['node']}: {added['mass']:.5g}, {added['inertia']:.5g}")
             first = " " * len(first)
         if row["clamped"]:
-            lines.append(" " * len(first) + "outside its segment: mass, inertia and stiffness use the projection "
-                                            "clamped to it")
+            lines.append(
+                " " * len(first) + "outside its segment: mass, inertia and stiffness use the projection clamped to it"
+            )
     return [*lines, *more(slaves, "slaves"), ""] if slaves else []
 
 
 def node_text(what: str, nodes: list[dict]) -> list[str]:
     if not nodes:
         return []
-    lines = [f"{what:>9} {'i':>6} {'motion':>7} {'rot':>4} {'mass [kg]':>11} {'added':>11} {'inertia +':>11} "
-             f"{'K [N/m]':>11} {'nodal step [s]':>15}"]
+    lines = [
+        f"{what:>9} {'i':>6} {'motion':>7} {'rot':>4} {'mass [kg]':>11} {'added':>11} {'inertia +':>11} "
+        f"{'K [N/m]':>11} {'nodal step [s]':>15}"
+    ]
     for row in nodes[:SHOWN]:
-        lines.append(f"{row['id']:>9} {row['number']:>6} {row['motion']:>7} {'yes' if row['rotations'] else 'no':>4} "
-                     f"{row['mass']:>11.5g} {row['added_mass']:>11.5g} {row['added_inertia']:>11.5g} "
-                     f"{row['stiffness']:>11.5g} {step(row['nodal_time_step']):>15}")
+        lines.append(
+            f"{row['id']:>9} {row['number']:>6} {row['motion']:>7} {'yes' if row['rotations'] else 'no':>4} "
+            f"{row['mass']:>11.5g} {row['added_mass']:>11.5g} {row['added_inertia']:>11.5g} "
+            f"{row['stiffness']:>11.5g} {step(row['nodal_time_step']):>15}"
+        )
     return [*lines, *more(nodes, what + "s"), ""]
 
 
@@ -245,16 +320,23 @@ def port_text(ports: list[dict]) -> list[str]:
     for row in ports[:SHOWN]:
         what = "slave" if row["moves"] == "slaves" else "driven node"
         added = f", added mass {row['added_mass']:.5g} kg" if "added_mass" in row else ""
-        lines.append(f"port '{row['name']}': {counted(len(row['nodes']), what)} about "
-                     f"[{', '.join(f'{x:.6g}' for x in row['at'])}] m{added}")
+        lines.append(
+            f"port '{row['name']}': {counted(len(row['nodes']), what)} about "
+            f"[{', '.join(f'{x:.6g}' for x in row['at'])}] m{added}"
+        )
     return [*lines, *more(ports, "ports"), ""] if ports else []
 
 
 def summary(found: dict) -> str:
     """How much of everything, in one line."""
     whats = ["tie", "slave", "master", "point"] + (["port"] if "ports" in found else [])
-    return ", ".join([*(counted(len(found[f"{what}s"]), what) for what in whats),
-                      counted(found["springs"], "spring"), counted(sum(found["variables"].values()), "variable")])
+    return ", ".join(
+        [
+            *(counted(len(found[f"{what}s"]), what) for what in whats),
+            counted(found["springs"], "spring"),
+            counted(sum(found["variables"].values()), "variable"),
+        ]
+    )
 
 
 def counted(n: int, what: str) -> str:

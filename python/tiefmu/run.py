@@ -11,7 +11,6 @@ import numpy as np
 
 from .schema import suggestion
 
-
 STEPS = 500  # at least, where the caller leaves the step open
 
 
@@ -19,8 +18,13 @@ class RunError(Exception):
     """A run that cannot start or did not finish; one line 'FILE: message'."""
 
 
-def run(fmu: Path, stop_time: float | None = None, step: float | None = None, inputs: Path | None = None,
-        name: str | None = None) -> np.ndarray:
+def run(
+    fmu: Path,
+    stop_time: float | None = None,
+    step: float | None = None,
+    inputs: Path | None = None,
+    name: str | None = None,
+) -> np.ndarray:
     """Runs the FMU and returns its outputs: a structured array with `time` (s) and one column an output, and FMPy's
     description of the FMU as `.modelDescription`.
 
@@ -57,9 +61,17 @@ def run(fmu: Path, stop_time: float | None = None, step: float | None = None, in
             said.append(message.decode(errors="replace") if isinstance(message, bytes) else str(message))
 
     reached = start
-    with tempfile.TemporaryDirectory(prefix="tiefmu-") as folder, \
-            tqdm(total=stop_time - start, unit="s", delay=2, disable=None, leave=False,
-                 bar_format="{percentage:3.0f}% |{bar}| {n:.4g} of {total:.4g} s, {remaining} left") as bar:
+    with (
+        tempfile.TemporaryDirectory(prefix="tiefmu-") as folder,
+        tqdm(
+            total=stop_time - start,
+            unit="s",
+            delay=2,
+            disable=None,
+            leave=False,
+            bar_format="{percentage:3.0f}% |{bar}| {n:.4g} of {total:.4g} s, {remaining} left",
+        ) as bar,
+    ):
 
         def step_finished(time, recorder):
             nonlocal reached
@@ -73,10 +85,19 @@ def run(fmu: Path, stop_time: float | None = None, step: float | None = None, in
             raise RunError(f"{name}: cannot be unpacked: {one_line(error)}") from None
         try:
             with contextlib.redirect_stdout(io.StringIO()):  # FMPy prints a line for each input that gets no column
-                return fmpy.simulate_fmu(folder, validate=False, model_description=description,
-                                         fmi_type="CoSimulation", start_time=start, stop_time=stop_time,
-                                         output_interval=step, input=signals, output=outputs, logger=log,
-                                         step_finished=step_finished)
+                return fmpy.simulate_fmu(
+                    folder,
+                    validate=False,
+                    model_description=description,
+                    fmi_type="CoSimulation",
+                    start_time=start,
+                    stop_time=stop_time,
+                    output_interval=step,
+                    input=signals,
+                    output=outputs,
+                    logger=log,
+                    step_finished=step_finished,
+                )
         except Exception as error:
             raise RunError(f"{name}: stopped at t = {reached:g} s: {one_line(said[-1] if said else error)}") from None
 
@@ -131,8 +152,10 @@ def read_inputs(path: Path, description) -> np.ndarray:
     time = table[:, header.index("time")]
     back = np.flatnonzero(np.diff(time) < 0)
     if len(back):
-        raise RunError(f"{path}: line {rows[back[0] + 2][0]}: time goes back from {time[back[0]]:g} to "
-                       f"{time[back[0] + 1]:g} s; times must not decrease")
+        raise RunError(
+            f"{path}: line {rows[back[0] + 2][0]}: time goes back from {time[back[0]]:g} to "
+            f"{time[back[0] + 1]:g} s; times must not decrease"
+        )
     order = ["time"] + [name for name in header if name != "time"]
     signals = np.empty(len(table), dtype=[(name, float) for name in order])
     for name in order:

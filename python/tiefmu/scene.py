@@ -155,8 +155,10 @@ class Assembly:
             slaves = self.nodes(f"{where}: slaves", table.slaves)
             fixed = slaves[(self.motion[slaves] == MOTIONS.index("fixed")) & (self.motion_table[slaves] > 0)]
             if len(fixed):
-                raise SceneError(f"{where}: slave {self.mesh.node_id[fixed[0]]}: constrained twice, by the tie and by "
-                                 f"motion = 'fixed' in node table {self.motion_table[fixed[0]]}; take it out of one")
+                raise SceneError(
+                    f"{where}: slave {self.mesh.node_id[fixed[0]]}: constrained twice, by the tie and by "
+                    f"motion = 'fixed' in node table {self.motion_table[fixed[0]]}; take it out of one"
+                )
             ties.append((table.name, segments, slaves))
         return ties
 
@@ -185,8 +187,10 @@ class Assembly:
             twice = nodes[owner[nodes] >= 0]
             if len(twice):
                 other = self.tables.interface.ports[owner[twice[0]]]["name"]
-                raise SceneError(f"{where}: node {self.mesh.node_id[twice[0]]}: is already in port '{other}'; a node "
-                                 "can be in one port only")
+                raise SceneError(
+                    f"{where}: node {self.mesh.node_id[twice[0]]}: is already in port '{other}'; a node "
+                    "can be in one port only"
+                )
             owner[nodes] = number
             ports.append(nodes)
         return ports
@@ -208,35 +212,68 @@ class Assembly:
         if table.w is not None:
             still = nodes[~self.rotations[nodes]]
             if len(still) and table.nodes != "all":
-                raise SceneError(f"{where}: w: node {self.mesh.node_id[still[0]]} has no rotations; "
-                                 "set rotations = true in a node table, or leave w out")
+                raise SceneError(
+                    f"{where}: w: node {self.mesh.node_id[still[0]]} has no rotations; "
+                    "set rotations = true in a node table, or leave w out"
+                )
             turning = nodes[self.rotations[nodes]]
             if not len(turning):
-                raise SceneError(f"{where}: w: no node has rotations; set rotations = true in a node table, or leave "
-                                 "w out")
+                raise SceneError(
+                    f"{where}: w: no node has rotations; set rotations = true in a node table, or leave w out"
+                )
             self.spin[turning] = self.units.si("w", table.w)
 
     def scene(self) -> _core.Scene:
         """What the solver compiles."""
         scene, si = _core.Scene(), self.units.si
-        scene.set_nodes(self.mesh.node_id, self.position, self.motion, self.rotations.astype(np.uint8),
-                        *(self.values[key] for key in NODE_VALUES), self.velocity, self.spin)
+        scene.set_nodes(
+            self.mesh.node_id,
+            self.position,
+            self.motion,
+            self.rotations.astype(np.uint8),
+            *(self.values[key] for key in NODE_VALUES),
+            self.velocity,
+            self.spin,
+        )
         scene.set_segments(self.mesh.segment_id, self.mesh.segments)
         for table, (name, segments, slaves) in zip(self.tables.tie, self.ties):
-            scene.add_tie(name, segments.astype(np.int32), slaves.astype(np.int32), table.formulation, table.search,
-                          si("search_distance", table.search_distance), table.unresolved == "drop")
+            scene.add_tie(
+                name,
+                segments.astype(np.int32),
+                slaves.astype(np.int32),
+                table.formulation,
+                table.search,
+                si("search_distance", table.search_distance),
+                table.unresolved == "drop",
+            )
         for number, (table, (a, b)) in enumerate(zip(self.tables.spring, self.springs), 1):
-            scene.add_springs(f"spring {number}", a.astype(np.int32), b.astype(np.int32), table.kind,
-                              *(np.broadcast_to(si(key, getattr(table, key)), 3).copy() for key in
-                                ("stiffness", "damping", "rotational_stiffness", "rotational_damping")))
+            scene.add_springs(
+                f"spring {number}",
+                a.astype(np.int32),
+                b.astype(np.int32),
+                table.kind,
+                *(
+                    np.broadcast_to(si(key, getattr(table, key)), 3).copy()
+                    for key in ("stiffness", "damping", "rotational_stiffness", "rotational_damping")
+                ),
+            )
         for port, nodes in zip(self.tables.interface.ports, self.ports):
             place = np.empty(0) if port["at"] is None else si("position", port["at"])
             scene.add_port(port["name"], nodes.astype(np.int32), isinstance(port["nodes"], list), place)
         model, integrator, interface = self.tables.model, self.tables.integrator, self.tables.interface
-        scene.set_settings(inertia=model.inertia, reaction=model.reaction, geometry=model.geometry,
-                           position=model.position, gravity=si("gravity", model.gravity), method=integrator.method,
-                           time_step=si("time_step", integrator.time_step), safety=integrator.safety,
-                           threads=integrator.threads, expose=interface.expose, hide=interface.hide)
+        scene.set_settings(
+            inertia=model.inertia,
+            reaction=model.reaction,
+            geometry=model.geometry,
+            position=model.position,
+            gravity=si("gravity", model.gravity),
+            method=integrator.method,
+            time_step=si("time_step", integrator.time_step),
+            safety=integrator.safety,
+            threads=integrator.threads,
+            expose=interface.expose,
+            hide=interface.hide,
+        )
         return scene
 
 

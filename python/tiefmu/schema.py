@@ -8,7 +8,7 @@ import re
 import sys
 from typing import Annotated, Any, Literal
 
-from pydantic import (AfterValidator, BaseModel, ConfigDict, Field, PlainValidator, ValidationError, model_validator)
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, PlainValidator, ValidationError, model_validator
 from pydantic_core import PydanticCustomError
 
 from ._core import SceneError
@@ -51,7 +51,7 @@ def is_number(value: Any) -> bool:
 
 
 def selection(value: Any) -> str | list[int]:
-    """"all", the name of a set, or a list of ids."""
+    """ "all", the name of a set, or a list of ids."""
     if isinstance(value, str):
         if not value:
             raise wrong("the name of the set is empty")
@@ -133,8 +133,11 @@ def port(value: Any) -> dict:
     if not PORT_NAME.fullmatch(name) or name != name.strip():
         cure = "; give the set as nodes, with another name" if isinstance(value, str) else ""
         raise wrong(f"{found(name)} cannot name a port: letters, digits, spaces and _ - . : / can{cure}")
-    return {"name": name, "nodes": keyed("nodes", selection, table.get("nodes", name)),
-            "at": keyed("at", vector, table["at"]) if "at" in table else None}
+    return {
+        "name": name,
+        "nodes": keyed("nodes", selection, table.get("nodes", name)),
+        "at": keyed("at", vector, table["at"]) if "at" in table else None,
+    }
 
 
 def keyed(key: str, check, value: Any) -> Any:
@@ -212,8 +215,9 @@ class Spring(Table):
     @model_validator(mode="after")
     def ends(self):
         if (self.nodes is None) == (self.ground is None):
-            raise wrong("give either nodes = [a, b] or ground = [ids], "
-                        + ("not both" if self.nodes else "found neither"))
+            raise wrong(
+                "give either nodes = [a, b] or ground = [ids], " + ("not both" if self.nodes else "found neither")
+            )
         if self.kind == "bushing":
             return self
         for key in ("rotational_stiffness", "rotational_damping"):
@@ -260,6 +264,7 @@ class Interface(Table):
 
 class SceneTables(Table):
     """A whole scene file."""
+
     title: Text = ""
     units: Units = Units()
     mesh: Mesh
@@ -272,8 +277,17 @@ class SceneTables(Table):
     interface: Interface = Interface()
 
 
-TABLES = {"units": Units, "mesh": Mesh, "node": Node, "tie": Tie, "spring": Spring, "initial": Initial, "model": Model,
-          "integrator": Integrator, "interface": Interface}
+TABLES = {
+    "units": Units,
+    "mesh": Mesh,
+    "node": Node,
+    "tie": Tie,
+    "spring": Spring,
+    "initial": Initial,
+    "model": Model,
+    "integrator": Integrator,
+    "interface": Interface,
+}
 ARRAYS = ("node", "tie", "spring", "initial")  # written [[node]]
 
 
@@ -329,10 +343,18 @@ def mesh_row(table: str, location: list, rows: list, error: dict) -> str:
 
 
 EXPECTED = {
-    "float_type": "a number", "float_parsing": "a number", "int_type": "a whole number",
-    "int_from_float": "a whole number", "int_parsing_size": "a smaller number", "bool_type": "true or false",
-    "string_type": "a text", "list_type": "a list", "tuple_type": "a list", "model_type": "a table",
-    "model_attributes_type": "a table", "dict_type": "a table",
+    "float_type": "a number",
+    "float_parsing": "a number",
+    "int_type": "a whole number",
+    "int_from_float": "a whole number",
+    "int_parsing_size": "a smaller number",
+    "bool_type": "true or false",
+    "string_type": "a text",
+    "list_type": "a list",
+    "tuple_type": "a list",
+    "model_type": "a table",
+    "model_attributes_type": "a table",
+    "dict_type": "a table",
 }
 
 

@@ -4,19 +4,38 @@ from fractions import Fraction
 
 import numpy as np
 
-LENGTHS = {"m": Fraction(1), "cm": Fraction(1, 100), "mm": Fraction(1, 1000), "um": Fraction(1, 10**6),
-           "km": Fraction(1000), "in": Fraction(254, 10000), "ft": Fraction(3048, 10000)}
-MASSES = {"kg": Fraction(1), "g": Fraction(1, 1000), "mg": Fraction(1, 10**6), "t": Fraction(1000),
-          "lb": Fraction(45359237, 10**8)}
+LENGTHS = {
+    "m": Fraction(1),
+    "cm": Fraction(1, 100),
+    "mm": Fraction(1, 1000),
+    "um": Fraction(1, 10**6),
+    "km": Fraction(1000),
+    "in": Fraction(254, 10000),
+    "ft": Fraction(3048, 10000),
+}
+MASSES = {
+    "kg": Fraction(1),
+    "g": Fraction(1, 1000),
+    "mg": Fraction(1, 10**6),
+    "t": Fraction(1000),
+    "lb": Fraction(45359237, 10**8),
+}
 TIMES = {"s": Fraction(1), "ms": Fraction(1, 1000), "us": Fraction(1, 10**6), "min": Fraction(60)}
 
 # What a key of the scene file measures: powers of length, mass and time. Angles are always in rad.
 DIMENSIONS = {
-    "position": (1, 0, 0), "search_distance": (1, 0, 0), "time_step": (0, 0, 1),
-    "mass": (0, 1, 0), "inertia": (2, 1, 0),
-    "stiffness": (0, 1, -2), "rotational_stiffness": (2, 1, -2),
-    "damping": (0, 1, -1), "rotational_damping": (2, 1, -1),
-    "v": (1, 0, -1), "w": (0, 0, -1), "gravity": (1, 0, -2),
+    "position": (1, 0, 0),
+    "search_distance": (1, 0, 0),
+    "time_step": (0, 0, 1),
+    "mass": (0, 1, 0),
+    "inertia": (2, 1, 0),
+    "stiffness": (0, 1, -2),
+    "rotational_stiffness": (2, 1, -2),
+    "damping": (0, 1, -1),
+    "rotational_damping": (2, 1, -1),
+    "v": (1, 0, -1),
+    "w": (0, 0, -1),
+    "gravity": (1, 0, -2),
 }
 
 

@@ -6,12 +6,31 @@ namespace {
 using memory::Throws;
 
 // The calls of a life that does everything, in order.
-const char* const script[] = {
-    "fmi2SetDebugLogging", "fmi2SetupExperiment", "fmi2SetReal", "fmi2GetFMUstate", "fmi2EnterInitializationMode",
-    "fmi2GetReal", "fmi2ExitInitializationMode", "fmi2GetReal", "fmi2SetRealInputDerivatives", "fmi2DoStep",
-    "fmi2GetReal", "fmi2SetReal", "fmi2GetDirectionalDerivative", "fmi2GetRealOutputDerivatives", "fmi2GetFMUstate",
-    "fmi2SerializedFMUstateSize", "fmi2SerializeFMUstate", "fmi2DeSerializeFMUstate", "fmi2SetFMUstate",
-    "fmi2GetRealStatus", "fmi2GetStringStatus", "fmi2GetInteger", "fmi2Terminate", "fmi2GetReal", "fmi2Reset"};
+const char* const script[] = {"fmi2SetDebugLogging",
+                              "fmi2SetupExperiment",
+                              "fmi2SetReal",
+                              "fmi2GetFMUstate",
+                              "fmi2EnterInitializationMode",
+                              "fmi2GetReal",
+                              "fmi2ExitInitializationMode",
+                              "fmi2GetReal",
+                              "fmi2SetRealInputDerivatives",
+                              "fmi2DoStep",
+                              "fmi2GetReal",
+                              "fmi2SetReal",
+                              "fmi2GetDirectionalDerivative",
+                              "fmi2GetRealOutputDerivatives",
+                              "fmi2GetFMUstate",
+                              "fmi2SerializedFMUstateSize",
+                              "fmi2SerializeFMUstate",
+                              "fmi2DeSerializeFMUstate",
+                              "fmi2SetFMUstate",
+                              "fmi2GetRealStatus",
+                              "fmi2GetStringStatus",
+                              "fmi2GetInteger",
+                              "fmi2Terminate",
+                              "fmi2GetReal",
+                              "fmi2Reset"};
 constexpr std::size_t scriptLength = sizeof script / sizeof *script;
 
 // What the caller must keep: an error is an error, a message says so, and a reset heals.
@@ -39,8 +58,9 @@ void failCall(const Packed& packed, std::size_t index, Throws what, bool all, co
     const fmi2Status status = r.call(session);
     const bool failed = memory::succeedAgain();
     if (!failed) return;
-    check(session, r, status, healthy, packed.folder + ": " + r.name + " (call " + std::to_string(index) +
-                                           "), allocation " + std::to_string(successes) + " fails");
+    check(session, r, status, healthy,
+          packed.folder + ": " + r.name + " (call " + std::to_string(index) + "), allocation " +
+              std::to_string(successes) + " fails");
   }
 }
 

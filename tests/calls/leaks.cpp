@@ -34,6 +34,6 @@ void testLeaks(const Packed& packed, long count) {
   const long before = memory::blocks();
   for (long i = 0; i < count; ++i) live(packed);
   const long more = memory::blocks() - before;
-  require(more == 0, packed.folder + ": " + std::to_string(more) + " blocks more after " + std::to_string(count) +
-                         " instances");
+  require(more == 0,
+          packed.folder + ": " + std::to_string(more) + " blocks more after " + std::to_string(count) + " instances");
 }

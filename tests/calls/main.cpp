@@ -49,12 +49,18 @@ int main(int count, char** words) {
   const long first = test == "sequences" ? number() : 0;
   require(!arguments.empty(), "no folder");
   const std::vector<Packed> packed(arguments.begin(), arguments.end());
-  if (test == "sequences") testSequences(packed, amount, first);
-  else if (test == "threads") testThreads(packed);
+  if (test == "sequences")
+    testSequences(packed, amount, first);
+  else if (test == "threads")
+    testThreads(packed);
   else
     for (const Packed& p : packed)
-      if (test == "states") testStates(p);
-      else if (test == "failures") testFailures(p);
-      else if (test == "leaks") testLeaks(p, amount);
-      else fail("no test '" + test + "'");
+      if (test == "states")
+        testStates(p);
+      else if (test == "failures")
+        testFailures(p);
+      else if (test == "leaks")
+        testLeaks(p, amount);
+      else
+        fail("no test '" + test + "'");
 }

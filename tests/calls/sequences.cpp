@@ -31,10 +31,7 @@ class Random {
   double between(double low, double high) {
     return low + (high - low) * std::ldexp(static_cast<double>(bits() >> 11), -53);
   }
-  template <class T>
-  const T& of(const std::vector<T>& list) {
-    return list[below(list.size())];
-  }
+  template <class T> const T& of(const std::vector<T>& list) { return list[below(list.size())]; }
 
  private:
   std::uint64_t state;
@@ -48,14 +45,16 @@ struct Attempt {
   bool refused = false;
 };
 
-struct Count {
-  long good = 0, refused = 0, errors = 0;
-};
+struct Count { long good = 0, refused = 0, errors = 0; };
 
 class Sequence {
  public:
   Sequence(const Packed& packed, const Packed& other, std::uint64_t seed, std::map<std::string, Count>& counts)
-      : packed_(packed), other_(other), random_(seed), tested_(packed, random_.once(2)), twin_(packed),
+      : packed_(packed),
+        other_(other),
+        random_(seed),
+        tested_(packed, random_.once(2)),
+        twin_(packed),
         counts_(counts) {}
 
   void run() {
@@ -78,9 +77,15 @@ class Sequence {
 
   // Half the time what a caller does next, so that sequences get somewhere.
   const Row& next() {
-    static const std::vector<std::string> running{
-        "fmi2DoStep", "fmi2DoStep", "fmi2SetReal", "fmi2GetReal", "fmi2SetRealInputDerivatives", "fmi2GetFMUstate",
-        "fmi2SetFMUstate", "fmi2SerializeFMUstate", "fmi2DeSerializeFMUstate"};
+    static const std::vector<std::string> running{"fmi2DoStep",
+                                                  "fmi2DoStep",
+                                                  "fmi2SetReal",
+                                                  "fmi2GetReal",
+                                                  "fmi2SetRealInputDerivatives",
+                                                  "fmi2GetFMUstate",
+                                                  "fmi2SetFMUstate",
+                                                  "fmi2SerializeFMUstate",
+                                                  "fmi2DeSerializeFMUstate"};
     if (random_.once(2)) return random_.of(standard);
     switch (state_) {
       case instantiated: return row(random_.once(4) ? "fmi2SetupExperiment" : "fmi2EnterInitializationMode");
@@ -138,9 +143,8 @@ class Sequence {
     if (status == fmi2Error) {
       // Refused after all, for a reason that only the FMU knows, or failed: a call that sets nothing tells.
       fmi2Boolean over = fmi2False;
-      const bool alive = state_ == terminated
-                             ? fmi2GetBooleanStatus(tested_.component, fmi2Terminated, &over) == fmi2OK
-                             : fmi2SetReal(tested_.component, nullptr, 0, nullptr) == fmi2OK;
+      const bool alive = state_ == terminated ? fmi2GetBooleanStatus(tested_.component, fmi2Terminated, &over) == fmi2OK
+                                              : fmi2SetReal(tested_.component, nullptr, 0, nullptr) == fmi2OK;
       if (!alive) state_ = error;
     } else if (name == "fmi2EnterInitializationMode") {
       state_ = initializationMode;
@@ -227,8 +231,8 @@ class Sequence {
   Attempt setDebugLogging(bool spoil) {
     std::vector<std::string> names;
     for (std::size_t n = random_.below(3); n > 0; --n)
-      names.push_back(random_.of(std::vector<std::string>{"logStatusError", "logStatusWarning", "logTie",
-                                                          "logStability", "logAll"}));
+      names.push_back(random_.of(
+          std::vector<std::string>{"logStatusError", "logStatusWarning", "logTie", "logStability", "logAll"}));
     const std::size_t kind = random_.below(3);
     if (spoil) names.push_back(kind == 0 ? "" : kind == 1 ? std::string(3000, '%') : "logEvents %s%n");
     const fmi2Boolean on = static_cast<fmi2Boolean>(random_.bits());
@@ -246,17 +250,17 @@ class Sequence {
     double start = random_.of(Values{0, 0, 1, -3, 1e6}), stop = start + random_.of(Values{0.1, 1, 1e3, 0});
     const bool defined = random_.once(2);
     if (spoil) {
-      if (defined && random_.once(2)) stop = random_.once(2) ? start - 1 : nan;
-      else start = notFinite();
+      if (defined && random_.once(2))
+        stop = random_.once(2) ? start - 1 : nan;
+      else
+        start = notFinite();
     }
     after_ = [=, this] {
       time_ = start;
       stop_ = defined ? stop : infinity;
     };
     const double tolerance = random_.once(2) ? nan : 1e-3;
-    return {[=](Session& s) {
-              return fmi2SetupExperiment(s.component, fmi2True, tolerance, start, defined, stop);
-            },
+    return {[=](Session& s) { return fmi2SetupExperiment(s.component, fmi2True, tolerance, start, defined, stop); },
             spoil};
   }
 
@@ -270,9 +274,8 @@ class Sequence {
     }
     return {[=](Session& s) {
               Values values(references.size(), nan);
-              const fmi2Status status =
-                  fmi2GetReal(s.component, nullReferences ? nullptr : references.data(), references.size(),
-                              nullValues ? nullptr : values.data());
+              const fmi2Status status = fmi2GetReal(s.component, nullReferences ? nullptr : references.data(),
+                                                    references.size(), nullValues ? nullptr : values.data());
               if (status == fmi2OK) s.give(values.data(), values.size() * sizeof(double));
               return status;
             },
@@ -322,8 +325,10 @@ class Sequence {
     bool refused = point + size > stop_;
     if (spoil) {
       refused = true;
-      if (random_.once(2)) size = random_.of(Values{0, -0.0, -0.01, nan, infinity, -infinity});
-      else point = random_.of(Values{time_ + 1, time_ - 0.05, nan, infinity, -infinity});
+      if (random_.once(2))
+        size = random_.of(Values{0, -0.0, -0.01, nan, infinity, -infinity});
+      else
+        point = random_.of(Values{time_ + 1, time_ - 0.05, nan, infinity, -infinity});
     } else if (random_.once(50)) {
       size = random_.of(Values{1e300, 5e-324, 1e-300});  // absurd, but the standard forbids none of them
       refused = point + size > stop_;
@@ -334,8 +339,7 @@ class Sequence {
   }
 
   // Index of an entry; mostly of one that holds something, unless it is to be written.
-  template <class T>
-  std::size_t filled(const std::vector<T>& list, bool written) {
+  template <class T> std::size_t filled(const std::vector<T>& list, bool written) {
     std::size_t at = random_.below(list.size());
     for (std::size_t tries = written ? 0 : 4; tries > 0 && list[at] == T{}; --tries) at = random_.below(list.size());
     return at;

@@ -43,9 +43,9 @@ class Session {
   const Packed& packed;
   fmi2Component component = nullptr;
   std::vector<Message> log;
-  std::vector<fmi2FMUstate> saved = std::vector<fmi2FMUstate>(3);  // states given to keep
+  std::vector<fmi2FMUstate> saved = std::vector<fmi2FMUstate>(3);                    // states given to keep
   std::vector<std::vector<fmi2Byte>> bytes = std::vector<std::vector<fmi2Byte>>(2);  // serialised states
-  std::string result;  // what the last call wrote
+  std::string result;                                                                // what the last call wrote
 
   void give(const void* data, std::size_t size);  // sets `result`
 
@@ -63,7 +63,7 @@ const char* stateName(State state);
 // FMI 2.0, table in section 4.2.4, for the states that this FMU can be in.
 struct Row {
   const char* name;
-  const char* allowed;  // one mark for each State
+  const char* allowed;           // one mark for each State
   fmi2Status (*call)(Session&);  // with good arguments
   bool with(State state) const { return allowed[2 * state] == 'x'; }
 };

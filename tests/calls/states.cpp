@@ -16,9 +16,9 @@ void testStates(const Packed& packed) {
         continue;
       }
       require(status == fmi2Error, where + ": not refused");
-      require(session.log.size() == 1 && session.log[0].status == fmi2Error &&
-                  session.log[0].category == "logStatusError",
-              where + ": not one message of an error");
+      require(
+          session.log.size() == 1 && session.log[0].status == fmi2Error && session.log[0].category == "logStatusError",
+          where + ": not one message of an error");
       const std::string& text = session.log[0].text;
       const std::string begin = std::string(r.name) + ": ";
       require(text == begin + "not allowed in state " + stateName(state) ||

@@ -88,8 +88,7 @@ bool takeState(const std::string& scene, const unsigned char* bytes, std::size_t
   fmi2Component c = new Instance(logger(), std::move(resource));
   fmi2EnterInitializationMode(c);
   fmi2FMUstate state = nullptr;
-  const bool taken =
-      fmi2DeSerializeFMUstate(c, reinterpret_cast<const fmi2Byte*>(bytes), size, &state) == fmi2OK;
+  const bool taken = fmi2DeSerializeFMUstate(c, reinterpret_cast<const fmi2Byte*>(bytes), size, &state) == fmi2OK;
   if (taken) {
     fmi2SetFMUstate(c, state);
     fmi2ExitInitializationMode(c);

@@ -1,6 +1,6 @@
 """Writes the corpus of the fuzzers: small resources and serialised states. Run it when a format version is raised.
 
-    python tests/fuzz/make_corpus.py
+python tests/fuzz/make_corpus.py
 """
 
 import sys
@@ -19,8 +19,10 @@ from fmu_scenes import SETTINGS, scene  # noqa: E402
 from port_scenes import ported  # noqa: E402
 
 SMALL = {
-    "mesh": {"nodes": [[1, 0, 0, 0], [2, 1, 0, 0], [3, 1, 1, 0], [4, 0, 1, 0], [101, 0.3, 0.6, 0.2]],
-             "segments": [[1, 1, 2, 3, 4]]},
+    "mesh": {
+        "nodes": [[1, 0, 0, 0], [2, 1, 0, 0], [3, 1, 1, 0], [4, 0, 1, 0], [101, 0.3, 0.6, 0.2]],
+        "segments": [[1, 1, 2, 3, 4]],
+    },
     "node": [{"nodes": "all", "motion": "free", "rotations": True, "mass": 1.0, "inertia": 0.1}],
     "tie": [{"name": "tie", "slaves": [101]}],
     "spring": [{"ground": [1, 2, 3, 4], "kind": "bushing", "stiffness": 100.0}],

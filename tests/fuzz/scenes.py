@@ -25,10 +25,48 @@ from tiefmu import package
 
 CORPUS = Path(__file__).resolve().parent / "corpus" / "scene"
 SCENES = sorted(CORPUS.glob("*.toml"))
-ODD = ["nan", "inf", "-inf", "-1", "0", "-0.0", "1e308", "-1e308", "1e-308", "1e200", "1e30", "9223372036854775807",
-       "9223372036854775808", "-9223372036854775808", "1e400", "true", "[]", "{}", "''", '"all"', "[[]]", "[1]", "1.5",
-       '"\\u0000"', '"a\\nb"', '"%s%n"', "\ufffe", "é", "\x00", "\n", ",", "=", "[", "]", '"', "#", "*", "$",
-       "1979-05-27", "0x1F"]
+ODD = [
+    "nan",
+    "inf",
+    "-inf",
+    "-1",
+    "0",
+    "-0.0",
+    "1e308",
+    "-1e308",
+    "1e-308",
+    "1e200",
+    "1e30",
+    "9223372036854775807",
+    "9223372036854775808",
+    "-9223372036854775808",
+    "1e400",
+    "true",
+    "[]",
+    "{}",
+    "''",
+    '"all"',
+    "[[]]",
+    "[1]",
+    "1.5",
+    '"\\u0000"',
+    '"a\\nb"',
+    '"%s%n"',
+    "\ufffe",
+    "é",
+    "\x00",
+    "\n",
+    ",",
+    "=",
+    "[",
+    "]",
+    '"',
+    "#",
+    "*",
+    "$",
+    "1979-05-27",
+    "0x1F",
+]
 
 
 def variant(text: str, rng: random.Random) -> str:
@@ -43,11 +81,13 @@ def variant(text: str, rng: random.Random) -> str:
         elif how < 5:
             lines = text.split("\n")
             at = rng.randrange(len(lines))
-            lines[at:at + 1] = [[], [lines[at]] * 2, [rng.choice(lines)], lines[at:]][rng.randrange(4)]
+            lines[at : at + 1] = [[], [lines[at]] * 2, [rng.choice(lines)], lines[at:]][rng.randrange(4)]
             text = "\n".join(lines)
         elif text:
             at = rng.randrange(len(text))
-            text = text[:at] + chr(rng.choice([0, 9, 10, 34, 44, 46, 91, 93, 127, 233, 0x2028, 0xfffe])) + text[at + 1:]
+            text = (
+                text[:at] + chr(rng.choice([0, 9, 10, 34, 44, 46, 91, 93, 127, 233, 0x2028, 0xFFFE])) + text[at + 1 :]
+            )
         text = text or "\n"
     return text
 
@@ -77,7 +117,7 @@ def write(number: int, folder: Path) -> Path:
         data = (variant(text, rng) if f == broken else text).encode("utf-8", "surrogatepass")
         if f == broken and rng.randrange(20) == 0:
             at = rng.randrange(len(data))
-            data = data[:at] + bytes([rng.randrange(256)]) + data[at + 1:]
+            data = data[:at] + bytes([rng.randrange(256)]) + data[at + 1 :]
         (folder / f.name).write_bytes(data)
     return folder / scene.name
 

@@ -5,21 +5,33 @@ import sys
 from pathlib import Path
 
 from cofmupy import Coordinator
-
 from runner import main
 
 
 def simulate(case):
-    connections = [{"source": {"id": source, "variable": here}, "target": [{"id": target, "variable": there}]}
-                   for source, here, target, there in case["connections"]]
+    connections = [
+        {"source": {"id": source, "variable": here}, "target": [{"id": target, "variable": there}]}
+        for source, here, target, there in case["connections"]
+    ]
     for name, inputs in case["inputs"].items():
         for variable, values in inputs.items():
-            stream = {"type": "literal", "interpolation": "previous",
-                      "values": {str(k * case["step"]): value for k, value in enumerate(values)}}
+            stream = {
+                "type": "literal",
+                "interpolation": "previous",
+                "values": {str(k * case["step"]): value for k, value in enumerate(values)},
+            }
             connections.append({"source": stream, "target": [{"id": name, "variable": variable}]})
     config = Path(sys.argv[2]).with_suffix(".cofmupy.json")
-    config.write_text(json.dumps({"root": "", "cosim_method": "jacobi", "connections": connections,
-                                  "fmus": [{"id": name, "path": path} for name, path in case["fmus"].items()]}))
+    config.write_text(
+        json.dumps(
+            {
+                "root": "",
+                "cosim_method": "jacobi",
+                "connections": connections,
+                "fmus": [{"id": name, "path": path} for name, path in case["fmus"].items()],
+            }
+        )
+    )
     coordinator = Coordinator()
     coordinator.start(str(config))
     rows = {name: [] for name in case["outputs"]}

@@ -7,7 +7,6 @@ from pathlib import Path
 # Before ecospy, whose library needs it and would look for it in the system's folders only.
 ctypes.CDLL(str(Path(sys.prefix) / "lib" / "libtbb.so.12"), mode=ctypes.RTLD_GLOBAL)
 from ecospy import EcosSimulation, EcosSimulationStructure  # noqa: E402
-
 from runner import main  # noqa: E402
 
 

@@ -4,7 +4,6 @@ import xml.etree.ElementTree as xml
 import zipfile
 
 from fmuloader.fmi2 import Fmi2Slave, Fmi2Type
-
 from runner import main
 
 
@@ -22,8 +21,10 @@ def simulate(case):
         slave.enter_initialization_mode()
 
     def exchange():
-        passed = [(target, references[target][there], slaves[source].get_real([references[source][here]])[0])
-                  for source, here, target, there in case["connections"]]
+        passed = [
+            (target, references[target][there], slaves[source].get_real([references[source][here]])[0])
+            for source, here, target, there in case["connections"]
+        ]
         for target, reference, value in passed:
             slaves[target].set_real([reference], [value])
 

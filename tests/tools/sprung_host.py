@@ -18,11 +18,20 @@ class SprungHost(Fmi2Slave):
         self.lagged = [0.0] * NODES  # velocity that the dampers see: that of the last half step
         for k in range(NODES):
             index = f"[{k // 3 + 1}].%s[{k % 3 + 1}]"
-            self.register_variable(Real("master" + index % "f_ext", causality=Fmi2Causality.input, start=0.0,
-                                        getter=lambda k=k: self.force[k],
-                                        setter=lambda value, k=k: self.force.__setitem__(k, value)), nested=False)
-            self.register_variable(Real("master" + index % "v", causality=Fmi2Causality.output,
-                                        getter=lambda k=k: self.speed[k]), nested=False)
+            self.register_variable(
+                Real(
+                    "master" + index % "f_ext",
+                    causality=Fmi2Causality.input,
+                    start=0.0,
+                    getter=lambda k=k: self.force[k],
+                    setter=lambda value, k=k: self.force.__setitem__(k, value),
+                ),
+                nested=False,
+            )
+            self.register_variable(
+                Real("master" + index % "v", causality=Fmi2Causality.output, getter=lambda k=k: self.speed[k]),
+                nested=False,
+            )
 
     def accelerate(self, k):
         return (self.force[k] - STIFFNESS[k % 3] * self.place[k] - DAMPING * self.lagged[k]) / MASS

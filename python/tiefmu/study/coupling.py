@@ -17,52 +17,68 @@ from .hosts import EXTRAPOLATIONS, Coupling, InProcess, Masses, Packaged
 from .limits import GROWS
 from .variants import Source
 
-OMEGA = 1000.0      # rad/s, of each of the host's masters on its ground spring, or of the exchanged spring; at least
-ZETA = 0.05         # of the host
+OMEGA = 1000.0  # rad/s, of each of the host's masters on its ground spring, or of the exchanged spring; at least
+ZETA = 0.05  # of the host
 EXCHANGE_ZETA = 0.25
-WINDOW = 2.0        # simulated time in radians of that spring
-AMPLITUDE = 1e-4    # of the mean edge of a segment: what is seen is the coupling, not the geometry
+WINDOW = 2.0  # simulated time in radians of that spring
+AMPLITUDE = 1e-4  # of the mean edge of a segment: what is seen is the coupling, not the geometry
 REACTIONS = ["loads", "full", "split", "spring-damper"]
-REFERENCE = 1000    # points of the reference
+REFERENCE = 1000  # points of the reference
 LARGEST_MATRIX = 200  # rows of a one-step map
-MAX_STEPS = 6000      # of a run in its place
-TIMES = ["cpu"]     # columns that differ from run to run
+MAX_STEPS = 6000  # of a run in its place
+TIMES = ["cpu"]  # columns that differ from run to run
 
 
 @dataclass
 class Row:
     scene: str
     host: str
-    reaction: str         # or "spring-damper": force exchange with massless slaves on springs and dampers to ground
-    extrapolation: str    # of the tie's loads, by the host
-    mass_ratio: float     # slaves over masters
-    step: float           # s
-    step_omega: float     # rad
+    reaction: str  # or "spring-damper": force exchange with massless slaves on springs and dampers to ground
+    extrapolation: str  # of the tie's loads, by the host
+    mass_ratio: float  # slaves over masters
+    step: float  # s
+    step_omega: float  # rad
     steps: int
-    error_velocity: float      # of the slaves, relative L2 over the trajectory, against the monolithic system
-    error_force: float         # of the tie's loads on the masters
-    error_final: float         # of the slaves' velocities at the end
-    power_residual: float      # W, rms over the communication points: sum f.v with the load the host used, minus with
+    error_velocity: float  # of the slaves, relative L2 over the trajectory, against the monolithic system
+    error_force: float  # of the tie's loads on the masters
+    error_final: float  # of the slaves' velocities at the end
+    power_residual: float  # W, rms over the communication points: sum f.v with the load the host used, minus with
     power_residual_relative: float  # the one the tie answers; relative to the rms of the interface's power
-    radius: float         # growth per step: spectral radius of the one-step map, or of a run where that is too large
-    status: str           # "stable", "unstable" (radius > 1, but the run is short) or "diverged" (no errors, no cost)
-    cpu: float            # s per simulated second
+    radius: float  # growth per step: spectral radius of the one-step map, or of a run where that is too large
+    status: str  # "stable", "unstable" (radius > 1, but the run is short) or "diverged" (no errors, no cost)
+    cpu: float  # s per simulated second
 
 
 def add_parser(studies):
     study = studies.add_parser(
-        "coupling", help="the packaged FMU against a host, over the communication step",
+        "coupling",
+        help="the packaged FMU against a host, over the communication step",
         description="Couples the FMU of a scene with driven masters to a host that carries them, for each reaction "
-        "mode and extrapolation, and compares with the monolithic system.")
+        "mode and extrapolation, and compares with the monolithic system.",
+    )
     study.add_argument("scene", metavar="SCENE", nargs="+", help="scene file (TOML) with driven masters")
-    study.add_argument("--out", metavar="DIR", type=Path, default=Path("out/study"),
-                       help="folder to write to (default: out/study)")
-    study.add_argument("--decades", metavar="N", type=float, default=5.0, help="decades of the communication step, "
-                       "down from one radian of the host (default: 5)")
-    study.add_argument("--host", choices=["sprung", "rigid"], default="sprung",
-                       help="masters on ground springs, or rigid masses without (default: sprung)")
-    study.add_argument("--mass-ratio", metavar="R", type=positive, help="scale the masters' masses until the slaves "
-                       "weigh R times as much (default: masses of the scene)")
+    study.add_argument(
+        "--out", metavar="DIR", type=Path, default=Path("out/study"), help="folder to write to (default: out/study)"
+    )
+    study.add_argument(
+        "--decades",
+        metavar="N",
+        type=float,
+        default=5.0,
+        help="decades of the communication step, down from one radian of the host (default: 5)",
+    )
+    study.add_argument(
+        "--host",
+        choices=["sprung", "rigid"],
+        default="sprung",
+        help="masters on ground springs, or rigid masses without (default: sprung)",
+    )
+    study.add_argument(
+        "--mass-ratio",
+        metavar="R",
+        type=positive,
+        help="scale the masters' masses until the slaves weigh R times as much (default: masses of the scene)",
+    )
     study.set_defaults(command=run)
 
 
@@ -85,8 +101,13 @@ def run(options) -> int:
     options.out.mkdir(parents=True, exist_ok=True)
     steps, sections, interrupted = ladder(options.decades), [], False
     total = len(studies) * len(REACTIONS) * len(EXTRAPOLATIONS) * sum(steps)
-    with tqdm(total=total, delay=2, disable=None, leave=False,
-              bar_format="{percentage:3.0f}% |{bar}| {elapsed}, {remaining} left") as bar:
+    with tqdm(
+        total=total,
+        delay=2,
+        disable=None,
+        leave=False,
+        bar_format="{percentage:3.0f}% |{bar}| {elapsed}, {remaining} left",
+    ) as bar:
         for study in studies:
             rows = []
             try:
@@ -124,14 +145,17 @@ def write(path: Path, rows: list[Row]):
 
 # ------------------------------------------------------------------------------------------------------- one scene
 
+
 class Study:
     """A scene whose driven masters a host takes over, with pulses on its slaves. Raises SceneError."""
 
     def __init__(self, path, host: str = "sprung", mass_ratio: float | None = None):
         self.source, self.host = Source(path), host
         if not self.source.any_driven:
-            raise SceneError(f"{path}: has no driven masters, so there is nothing for a host to move; "
-                             "motion = \"driven\" in a [[node]] table gives them to the host")
+            raise SceneError(
+                f"{path}: has no driven masters, so there is nothing for a host to move; "
+                'motion = "driven" in a [[node]] table gives them to the host'
+            )
         self.base = self.source.arrays(self.source.tables, heavy=False)
         self.base.model.gravity, self.base.initial = [0.0, 0.0, 0.0], []
         self.base.interface, self.base.model.position = schema.Interface(), "input"
@@ -146,9 +170,10 @@ class Study:
         for k in np.flatnonzero(tie.own <= 0):
             place = k // 3 if k < n else tie.names.driven.index(tie.names.turning[(k - n) // 3])
             what = "mass" if k < n else "inertia"
-            raise SceneError(f"{path}: master {tie.node_ids[place]}: has no {what} of its own, which a host needs; "
-                             f"give {what} in a [[node]] table"
-                             + (", or --mass-ratio" if what == "mass" else ""))
+            raise SceneError(
+                f"{path}: master {tie.node_ids[place]}: has no {what} of its own, which a host needs; "
+                f"give {what} in a [[node]] table" + (", or --mass-ratio" if what == "mass" else "")
+            )
         self.own = tie.own * (self.tied / (mass_ratio * host_mass) if mass_ratio and self.tied > 0 else 1.0)
         self.ratio = self.tied / float(self.own[:n:3].sum())
         self.translations, self.node_ids, self.names = n, tie.node_ids.tolist(), tie.names
@@ -159,8 +184,15 @@ class Study:
 
     def edge(self) -> float:
         place = {row[0]: np.array(row[1:], float) for row in self.base.mesh.nodes}
-        return float(np.mean([np.linalg.norm(place[a] - place[b]) for _, *s in self.base.mesh.segments
-                              for a, b in zip(s, s[1:] + s[:1])]))
+        return float(
+            np.mean(
+                [
+                    np.linalg.norm(place[a] - place[b])
+                    for _, *s in self.base.mesh.segments
+                    for a, b in zip(s, s[1:] + s[:1])
+                ]
+            )
+        )
 
     def pulse(self, t: float) -> float:
         """0 before the start, with its first three derivatives, so that an extrapolation's past is exact."""
@@ -183,9 +215,16 @@ class Study:
             for table in tables.node:
                 if table.nodes[0] in self.slaves:
                     table.mass = table.inertia = 0.0
-            share = float(self.own[:self.translations:3].sum()) / len(self.slaves)
-            tables.spring += [schema.Spring(ground=[slave], kind="bushing", stiffness=share * self.omega**2,
-                                            damping=2 * EXCHANGE_ZETA * share * self.omega) for slave in self.slaves]
+            share = float(self.own[: self.translations : 3].sum()) / len(self.slaves)
+            tables.spring += [
+                schema.Spring(
+                    ground=[slave],
+                    kind="bushing",
+                    stiffness=share * self.omega**2,
+                    damping=2 * EXCHANGE_ZETA * share * self.omega,
+                )
+                for slave in self.slaves
+            ]
         else:
             tables.model.reaction, tables.model.inertia = reaction, "lumped" if reaction == "loads" else "consistent"
         return tables
@@ -200,8 +239,11 @@ class Study:
         """The host carries D but in `full`; translations are sprung unless it is rigid or the exchange is a spring."""
         sprung = self.own * (np.arange(len(self.own)) < self.translations)
         sprung = sprung * (self.host == "sprung" and reaction != "spring-damper")
-        return Masses(self.own + (0.0 if reaction == "full" else 1.0) * added, sprung * self.omega**2,
-                      sprung * 2 * ZETA * self.omega)
+        return Masses(
+            self.own + (0.0 if reaction == "full" else 1.0) * added,
+            sprung * self.omega**2,
+            sprung * 2 * ZETA * self.omega,
+        )
 
     def rows(self, steps: list[int]):
         """One Row for each reaction, extrapolation and number of steps."""
@@ -216,13 +258,33 @@ class Study:
                     for count in steps:
                         yield self.row(tie, linear, references[kind], reaction, order, extrapolation, count)
 
-    def row(self, tie: Packaged, linear: InProcess, reference: "Reference", reaction: str, order: int,
-            extrapolation: str, count: int) -> Row:
+    def row(
+        self,
+        tie: Packaged,
+        linear: InProcess,
+        reference: "Reference",
+        reaction: str,
+        order: int,
+        extrapolation: str,
+        count: int,
+    ) -> Row:
         size, host = self.window / count, self.masses(reaction, tie.added)
         probe = Coupling(linear, host, size, order)
         radius = self.rate(probe)
-        row = Row(self.source.name, self.host, reaction, extrapolation, self.ratio, size, size * self.omega, count,
-                  *[math.nan] * 5, radius, "diverged", math.nan)
+        row = Row(
+            self.source.name,
+            self.host,
+            reaction,
+            extrapolation,
+            self.ratio,
+            size,
+            size * self.omega,
+            count,
+            *[math.nan] * 5,
+            radius,
+            "diverged",
+            math.nan,
+        )
         run = self.simulate(tie, host, size, order, count)
         if run is None:
             return row
@@ -233,7 +295,7 @@ class Study:
             return row
         row.error_velocity, row.error_force = relative(velocity, exact_velocity), relative(load, exact_load)
         row.error_final = relative(velocity[-1:], exact_velocity[-1:])
-        row.power_residual = float(np.sqrt(np.mean(residual[1:]**2)))
+        row.power_residual = float(np.sqrt(np.mean(residual[1:] ** 2)))
         row.power_residual_relative = row.power_residual / reference.power_rms
         row.cpu, row.status = cpu, "stable" if radius <= GROWS else "unstable"
         return row
@@ -299,15 +361,20 @@ class Reference:
         for k, node in enumerate(study.node_ids):
             table[node].motion, table[node].mass = "free", float(study.own[3 * k])
             if self.host.stiffness[3 * k]:
-                tables.spring.append(schema.Spring(ground=[node], kind="bushing",
-                                                   stiffness=float(self.host.stiffness[3 * k]),
-                                                   damping=float(self.host.damping[3 * k])))
+                tables.spring.append(
+                    schema.Spring(
+                        ground=[node],
+                        kind="bushing",
+                        stiffness=float(self.host.stiffness[3 * k]),
+                        damping=float(self.host.damping[3 * k]),
+                    )
+                )
         self.turning = [study.node_ids[study.names.driven.index(i)] for i in study.names.turning]
         for k, node in enumerate(self.turning):
             table[node].inertia = float(study.own[study.translations + 3 * k])
         self.tables, self.scene = tables, study.source.compile(tables)
         self.values, self.error = self.romberg([self.run(REFERENCE * 2**level) for level in range(4)])
-        self.power_rms = float(np.sqrt(np.mean(self.values["power"]**2)))
+        self.power_rms = float(np.sqrt(np.mean(self.values["power"] ** 2)))
 
     @staticmethod
     def romberg(levels: list[dict]) -> tuple[dict, float]:
@@ -327,8 +394,11 @@ class Reference:
         simulation.initialise(0.0)
         index = {int(i): k for k, i in enumerate(self.scene.model.report()["nodes"]["id"])}
         rows, turning = [index[i] for i in study.node_ids], [index[i] for i in self.turning]
-        start, size, every = simulation.get("position")[rows] if "position" in simulation.fields else 0.0, \
-            study.window / count, count // REFERENCE
+        start, size, every = (
+            simulation.get("position")[rows] if "position" in simulation.fields else 0.0,
+            study.window / count,
+            count // REFERENCE,
+        )
         found = {"velocity": [], "load": [], "power": []}
         for n in range(count + 1):
             if n % every == 0:
@@ -373,13 +443,17 @@ MARKERS = {"held": "o", "linear": "s", "quadratic": "^"}
 def draw(rows: list[Row], folder: Path, name: str) -> Path:
     """Errors of velocities and loads and the power residual over H omega, PNG and SVG; returns the latter."""
     import matplotlib
+
     matplotlib.use("Agg")
     matplotlib.rcParams["svg.hashsalt"] = name  # the same ids in every run
     import matplotlib.pyplot as plt
     from matplotlib.lines import Line2D
 
-    panels = [("error_velocity", "error of the slaves' velocities"),
-              ("error_force", "error of the loads on the masters"), ("power_residual_relative", "power residual")]
+    panels = [
+        ("error_velocity", "error of the slaves' velocities"),
+        ("error_force", "error of the loads on the masters"),
+        ("power_residual_relative", "power residual"),
+    ]
     figure, axes = plt.subplots(2, 2, figsize=(12, 9.5), sharex=True, layout="constrained")
     ways = [(reaction, style) for reaction in REACTIONS for style in EXTRAPOLATIONS]
     for place, (reaction, style) in enumerate(ways):
@@ -387,8 +461,13 @@ def draw(rows: list[Row], folder: Path, name: str) -> Path:
         good = [row for row in own if row.status == "stable"]
         look = {"marker": MARKERS[style], "markersize": 4, "color": COLOURS[reaction], "fillstyle": "none"}
         for axis, (key, _) in zip(axes.flat, panels):
-            axis.plot([row.step_omega for row in good], [getattr(row, key) for row in good], STYLES[style],
-                      linewidth=1.3, **look)
+            axis.plot(
+                [row.step_omega for row in good],
+                [getattr(row, key) for row in good],
+                STYLES[style],
+                linewidth=1.3,
+                **look,
+            )
         last = axes[1, 1]
         last.plot([row.step_omega for row in good], [place] * len(good), linestyle="", **look)
         bad = [row.step_omega for row in own if row.status != "stable"]
@@ -402,15 +481,28 @@ def draw(rows: list[Row], folder: Path, name: str) -> Path:
     for axis in axes[1]:
         axis.set_xlabel(r"communication step  $H\,\omega$  [rad]")
     handles = [Line2D([], [], color=c, label=r) for r, c in COLOURS.items()]
-    handles += [Line2D([], [], color="black", linestyle=STYLES[s], marker=MARKERS[s], markersize=4, fillstyle="none",
-                       label=f"load {s}" if s == "held" else f"extrapolated, {s}") for s in EXTRAPOLATIONS]
+    handles += [
+        Line2D(
+            [],
+            [],
+            color="black",
+            linestyle=STYLES[s],
+            marker=MARKERS[s],
+            markersize=4,
+            fillstyle="none",
+            label=f"load {s}" if s == "held" else f"extrapolated, {s}",
+        )
+        for s in EXTRAPOLATIONS
+    ]
     handles.append(Line2D([], [], color="black", marker="x", linestyle="", label="unstable or diverged"))
     figure.legend(handles=handles, ncol=4, loc="outside lower center", frameon=False)
-    figure.suptitle(f"{rows[0].scene}: {rows[0].host} host, slaves {rows[0].mass_ratio:.3g} times as heavy as its "
-                    "masters")
+    figure.suptitle(
+        f"{rows[0].scene}: {rows[0].host} host, slaves {rows[0].mass_ratio:.3g} times as heavy as its masters"
+    )
     for suffix in ("png", "svg"):
-        figure.savefig(folder / f"{name}.{suffix}", dpi=130,
-                       metadata={"Software": None} if suffix == "png" else {"Date": None})
+        figure.savefig(
+            folder / f"{name}.{suffix}", dpi=130, metadata={"Software": None} if suffix == "png" else {"Date": None}
+        )
     plt.close(figure)
     return folder / f"{name}.svg"
 
@@ -423,12 +515,18 @@ INTRO = [
     "that of the coupling. Smooth pulses act on the slaves; the exact solution is the monolithic system.",
     "'loads' is lumped, so its error cannot fall below that of lumping. 'spring-damper' exchanges a force: the slaves "
     "weigh nothing and hang on springs and dampers inside the FMU. The power residual is sum f.v at a communication "
-    "point with the load that the host has used, minus with the load that the tie answers there."]
+    "point with the load that the host has used, minus with the load that the tie answers there.",
+]
 
 
 def section(study: Study, rows: list[Row], figure: Path) -> page.Section:
-    return page.Section(study.source.name, [verdict(rows)], [("Error over communication step", figure)],
-                        list(Row.__dataclass_fields__), [list(asdict(row).values()) for row in rows])
+    return page.Section(
+        study.source.name,
+        [verdict(rows)],
+        [("Error over communication step", figure)],
+        list(Row.__dataclass_fields__),
+        [list(asdict(row).values()) for row in rows],
+    )
 
 
 def verdict(rows: list[Row]) -> str:
@@ -439,6 +537,8 @@ def verdict(rows: list[Row]) -> str:
             own = [row for row in rows if (row.reaction, row.extrapolation) == (reaction, style)]
             good = [row.step_omega for row in own if row.status == "stable"]
             if own:
-                words.append(f"{reaction}, {style}: " + (f"stable up to H omega = {max(good):.3g}" if good else
-                                                         "unstable at every step"))
+                words.append(
+                    f"{reaction}, {style}: "
+                    + (f"stable up to H omega = {max(good):.3g}" if good else "unstable at every step")
+                )
     return "; ".join(words) + "."

@@ -33,8 +33,13 @@ class Names:
         answering = found.get(("master.t", "output"), [])
 
         def vectors(quantity, translations, rotations=()):
-            return [f"master[{i}].{q}[{k}]" for q, numbers in ((quantity[0], translations), (quantity[1], rotations))
-                    for i in numbers for k in (1, 2, 3)]
+            return [
+                f"master[{i}].{q}[{k}]"
+                for q, numbers in ((quantity[0], translations), (quantity[1], rotations))
+                for i in numbers
+                for k in (1, 2, 3)
+            ]
+
         accelerated = ("master.a", "input") in found
         self.velocity = vectors("vw", self.driven, self.turning)
         self.acceleration = vectors("az", self.driven, self.turning) if accelerated else []
@@ -42,9 +47,10 @@ class Names:
         self.inputs = self.velocity + self.acceleration + self.position
         self.load = vectors("ft", self.driven, [i for i in self.turning if i in answering])
         # freedom of each entry of `load`: a turning node without a moment output gets none
-        self.loaded = np.array([k for k in range(3 * len(self.driven))] +
-                               [3 * len(self.driven) + 3 * n + k for n, i in enumerate(self.turning)
-                                if i in answering for k in range(3)])
+        self.loaded = np.array(
+            [k for k in range(3 * len(self.driven))]
+            + [3 * len(self.driven) + 3 * n + k for n, i in enumerate(self.turning) if i in answering for k in range(3)]
+        )
         self.slaves = sorted(found[("slave.v", "output")])
         self.slave_velocity = [f"slave[{j}].v[{k}]" for j in self.slaves for k in (1, 2, 3)]
         self.slave_force = [f"slave[{j}].f[{k}]" for j in self.slaves for k in (1, 2, 3)]
@@ -66,7 +72,7 @@ class Tie:
         self.node_ids = nodes["id"][driven]
         added_mass, added_inertia = scene.start.get("added_mass"), np.zeros(len(nodes["id"]))
         if "added_inertia" in scene.start.fields:
-            added_inertia[:nodes["rotating"]] = scene.start.get("added_inertia")
+            added_inertia[: nodes["rotating"]] = scene.start.get("added_inertia")
         self.added = np.repeat(np.concatenate([added_mass[driven], added_inertia[turning]]), 3)
         self.accelerated, self.positioned = bool(self.names.acceleration), bool(self.names.position)
         self.inputs = np.zeros(len(self.names.inputs))
@@ -79,7 +85,7 @@ class Tie:
     def carry(self, velocity, time: float, size: float):
         """One step of the tie. velocity: mean of the step, with which the tie turns its offsets; the velocity at either
         end would make that, and every load on an offset, of first order."""
-        self.inputs[:len(velocity)] = velocity
+        self.inputs[: len(velocity)] = velocity
         self.set_inputs()
         self.step(time, size)
 
@@ -88,9 +94,9 @@ class Tie:
         n = len(velocity)
         self.inputs[:n] = velocity
         if self.accelerated:
-            self.inputs[n:2 * n] = acceleration
+            self.inputs[n : 2 * n] = acceleration
         if self.positioned:
-            self.inputs[-len(self.start):] = self.start + displacement[:len(self.start)]
+            self.inputs[-len(self.start) :] = self.start + displacement[: len(self.start)]
         load = np.zeros(n)
         self.set_inputs()
         load[self.names.loaded] = self.loads_now()
@@ -140,19 +146,30 @@ class Packaged(Tie):
         path = package.build(scene, f"{self.folder.name}/scene.fmu")
         description = fmpy.read_model_description(str(path), validate=False)
         fmpy.extract(str(path), self.folder.name)
-        self.fmu = fmpy.fmi2.FMU2Slave(guid=description.guid, unzipDirectory=self.folder.name, instanceName="tie",
-                                       modelIdentifier=description.coSimulation.modelIdentifier)
+        self.fmu = fmpy.fmi2.FMU2Slave(
+            guid=description.guid,
+            unzipDirectory=self.folder.name,
+            instanceName="tie",
+            modelIdentifier=description.coSimulation.modelIdentifier,
+        )
         reference = {v.name: v.valueReference for v in description.modelVariables}
 
         def block(names, values):
             """Arguments of fmi2SetReal and fmi2GetReal after the instance."""
-            return ((ctypes.c_uint32 * len(names))(*(reference[n] for n in names)), len(names),
-                    values.ctypes.data_as(ctypes.POINTER(ctypes.c_double)))
+            return (
+                (ctypes.c_uint32 * len(names))(*(reference[n] for n in names)),
+                len(names),
+                values.ctypes.data_as(ctypes.POINTER(ctypes.c_double)),
+            )
+
         self.loads = np.zeros(len(self.names.load))
         self.forces, self.slave = np.zeros((2, len(self.names.slave_force)))
-        self.calls = {"inputs": block(self.names.inputs, self.inputs), "loads": block(self.names.load, self.loads),
-                      "forces": block(self.names.slave_force, self.forces),
-                      "slave": block(self.names.slave_velocity, self.slave)}
+        self.calls = {
+            "inputs": block(self.names.inputs, self.inputs),
+            "loads": block(self.names.load, self.loads),
+            "forces": block(self.names.slave_force, self.forces),
+            "slave": block(self.names.slave_velocity, self.slave),
+        }
         self.begin()
 
     def begin(self):
@@ -213,6 +230,7 @@ def exponential(matrix: np.ndarray) -> np.ndarray:
 class Masses:
     """What the host carries, per freedom: (M + D) u'' + damping u' + stiffness u = load. kg, N s/m, N/m, or the same of
     rotations."""
+
     mass: np.ndarray
     stiffness: np.ndarray
     damping: np.ndarray
@@ -220,12 +238,15 @@ class Masses:
     def propagator(self, step: float) -> np.ndarray:
         """(2, 5, freedoms): u and H u' after the step, from u, H u' and the coefficients of H^2 load/mass as a
         polynomial of degree two in (time / H)."""
-        kinds, which = np.unique(np.column_stack([step**2 * self.stiffness, step * self.damping])
-                                 / self.mass[:, None], axis=0, return_inverse=True)
+        kinds, which = np.unique(
+            np.column_stack([step**2 * self.stiffness, step * self.damping]) / self.mass[:, None],
+            axis=0,
+            return_inverse=True,
+        )
         generator = np.zeros((len(kinds), 5, 5))
-        generator[:, 0, 1] = generator[:, 1, 2] = 1     # u' = H u', (H u')' = ... + q(s)
+        generator[:, 0, 1] = generator[:, 1, 2] = 1  # u' = H u', (H u')' = ... + q(s)
         generator[:, 1, :2] = -kinds
-        generator[:, 2, 3], generator[:, 3, 4] = 1, 2   # q0 + q1 s + q2 s^2, its derivatives at the running s
+        generator[:, 2, 3], generator[:, 3, 4] = 1, 2  # q0 + q1 s + q2 s^2, its derivatives at the running s
         return np.moveaxis(exponential(generator)[which.ravel()][:, :2], 0, -1)
 
 

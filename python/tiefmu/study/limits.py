@@ -1,7 +1,7 @@
 """Small scenes with known limits, and the means to find where a run starts to grow."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Callable
 
 import numpy as np
 
@@ -19,6 +19,7 @@ class Limit:
     closed: the closed form; fails(value): does it, by a run or by asking the program; radius(value): spectral radius of
     the one-step map there, where it can be had; stated: the limit that the program itself gives, where it does.
     """
+
     item: str
     case: str
     parameter: str
@@ -36,6 +37,7 @@ class Limit:
 @dataclass
 class Value:
     """A number that a closed form predicts."""
+
     item: str
     case: str
     parameter: str
@@ -67,25 +69,43 @@ def plate(slave_mass: float, reaction: str, spring=(0.0, 0.0), place=(0.5, 0.5, 
         "mesh": {"nodes": [*SQUARE, [5, *place]], "segments": [[1, 1, 2, 3, 4]]},
         "node": [{"nodes": "all", "mass": 1.0}, {"nodes": [5], "mass": slave_mass}],
         "tie": [{"name": "tie", "segments": "all", "slaves": [5], "search_distance": 10.0, **tie}],
-        "model": {"reaction": reaction, "inertia": "lumped" if reaction == "loads" else "consistent",
-                  "geometry": "small", "position": "input"},
+        "model": {
+            "reaction": reaction,
+            "inertia": "lumped" if reaction == "loads" else "consistent",
+            "geometry": "small",
+            "position": "input",
+        },
     }
     if any(spring):
         scene["spring"] = [{"ground": [5], "kind": "bushing", "stiffness": spring[0], "damping": spring[1]}]
     return load(scene)
 
 
-def coupled(scene: Scene, reaction: str, step: float, order: int = 0, differenced: bool = False, omega: float = 0.0,
-            zeta: float = 0.0, share: float = 1.0) -> Coupling:
+def coupled(
+    scene: Scene,
+    reaction: str,
+    step: float,
+    order: int = 0,
+    differenced: bool = False,
+    omega: float = 0.0,
+    zeta: float = 0.0,
+    share: float = 1.0,
+) -> Coupling:
     """The scene's host at this step. omega, zeta: of each master alone on its ground spring (rad/s, 1); share: the part
     of D that the host carries where the reaction asks for D (THEORY 5)."""
     tie = InProcess(scene)
     carried = 0.0 if reaction == "full" else share
-    return Coupling(tie, Masses(tie.own + carried * tie.added, tie.own * omega**2, tie.own * 2 * zeta * omega), step,
-                    order, differenced)
+    return Coupling(
+        tie,
+        Masses(tie.own + carried * tie.added, tie.own * omega**2, tie.own * 2 * zeta * omega),
+        step,
+        order,
+        differenced,
+    )
 
 
 # ---------------------------------------------------------------------------------------------------- free structures
+
 
 class FreeRun:
     """A scene with free nodes, stepped at any step, also beyond the limit."""
@@ -131,6 +151,9 @@ class FreeRun:
                 simulation.set(field, moved)
                 simulation.set(other, rest[other])
                 simulation.step(step)
-                columns.append(np.concatenate([(simulation.get("position") - position).ravel(),
-                                               step * simulation.get("velocity").ravel()]))
+                columns.append(
+                    np.concatenate(
+                        [(simulation.get("position") - position).ravel(), step * simulation.get("velocity").ravel()]
+                    )
+                )
         return float(np.abs(np.linalg.eigvals(np.array(columns).T)).max())

@@ -15,13 +15,14 @@ from ..scene import Scene
 
 REPEATS = 3
 SHORTEST = 0.005  # s of CPU time that one measurement takes at least
-LONGEST = 0.3     # s after which a measurement is not repeated
+LONGEST = 0.3  # s after which a measurement is not repeated
 
 
 @dataclass
 class Trajectory:
     """At the end of each interval: v (n, slaves, 3) and f (n, masters, 3), by ascending node id, m/s and N. f is the
     tie's whole load on the master, inertia included. energy_residual: largest over the run, relative."""
+
     v: np.ndarray
     f: np.ndarray
     energy_residual: float = np.nan
@@ -49,8 +50,10 @@ class Signals:
         self.time, self.values = time, values
         # integral up to each row, for means over intervals
         steps = np.diff(time)[:, None]
-        self.integral = {key: np.vstack([np.zeros(3), np.cumsum(0.5 * steps * (x[1:] + x[:-1]), axis=0)])
-                         for key, x in values.items()}
+        self.integral = {
+            key: np.vstack([np.zeros(3), np.cumsum(0.5 * steps * (x[1:] + x[:-1]), axis=0)])
+            for key, x in values.items()
+        }
 
     @classmethod
     def read(cls, scene: Scene, path) -> "Signals":
@@ -58,6 +61,7 @@ class Signals:
         if path is None:
             return cls(np.zeros(1), {})
         from ..run import RunError, read_inputs
+
         inputs, known = {}, []
         for block in scene.simulation().variables:
             short = block["name"].removeprefix(block["prefix"] + ".")
@@ -138,9 +142,12 @@ class Held:
     def __init__(self, scene: Scene, rows: Rows, signals: Signals, edges: np.ndarray):
         fields = scene.start.fields
         mass, inertia = (scene.model.report()["nodes"][key] for key in ("mass", "inertia"))
-        place = {"node_force": (len(rows.node), 3), "node_moment": (rows.rotating, 3),
-                 "slave_force": (len(rows.slave), 3),
-                 "slave_moment": (fields.get("slave_moment", 0) // 3, 3)}
+        place = {
+            "node_force": (len(rows.node), 3),
+            "node_moment": (rows.rotating, 3),
+            "slave_force": (len(rows.slave), 3),
+            "slave_moment": (fields.get("slave_moment", 0) // 3, 3),
+        }
         self.start = {}
         velocity, spin = scene.start.get("velocity"), scene.start.get("spin") if rows.rotating else None
         for (node, quantity), _ in signals.values.items():  # driven nodes start with the motion given at the start

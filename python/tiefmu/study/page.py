@@ -19,6 +19,7 @@ th { position: sticky; top: 0; background: #f3f5f7; } td:first-child, th:first-c
 @dataclass
 class Section:
     """text: paragraphs (plain text); figures: (caption, path of an SVG); header, rows: a table, numbers as they are."""
+
     title: str
     text: list[str] = field(default_factory=list)
     figures: list[tuple[str, Path]] = field(default_factory=list)
@@ -28,15 +29,24 @@ class Section:
 
 def write(path: Path, title: str, intro: list[str], sections: list[Section]):
     """Writes the page. Raises OSError."""
-    parts = ["<!DOCTYPE html>", '<html lang="en"><head><meta charset="utf-8">', f"<title>{html.escape(title)}</title>",
-             f"<style>{STYLE}</style></head><body>", f"<h1>{html.escape(title)}</h1>", *map(paragraph, intro), "<nav>"]
+    parts = [
+        "<!DOCTYPE html>",
+        '<html lang="en"><head><meta charset="utf-8">',
+        f"<title>{html.escape(title)}</title>",
+        f"<style>{STYLE}</style></head><body>",
+        f"<h1>{html.escape(title)}</h1>",
+        *map(paragraph, intro),
+        "<nav>",
+    ]
     parts += [f'<p><a href="#s{n}">{html.escape(section.title)}</a></p>' for n, section in enumerate(sections)]
     parts.append("</nav>")
     for n, section in enumerate(sections):
         parts.append(f'<h2 id="s{n}">{html.escape(section.title)}</h2>')
         parts += map(paragraph, section.text)
-        parts += [f"<figure>{svg(file, f's{n}f{k}-')}<figcaption>{html.escape(caption)}</figcaption></figure>"
-                  for k, (caption, file) in enumerate(section.figures)]
+        parts += [
+            f"<figure>{svg(file, f's{n}f{k}-')}<figcaption>{html.escape(caption)}</figcaption></figure>"
+            for k, (caption, file) in enumerate(section.figures)
+        ]
         if section.rows:
             parts.append('<div class="scroll">' + table(section.header, section.rows) + "</div>")
     path.write_text("\n".join([*parts, "</body></html>", ""]), encoding="utf-8")
@@ -48,8 +58,9 @@ def paragraph(text: str) -> str:
 
 def table(header: list[str], rows: list[list]) -> str:
     head = "".join(f"<th>{html.escape(name)}</th>" for name in header)
-    body = "\n".join("<tr>" + "".join(f"<td>{html.escape(cell(value))}</td>" for value in row) + "</tr>"
-                     for row in rows)
+    body = "\n".join(
+        "<tr>" + "".join(f"<td>{html.escape(cell(value))}</td>" for value in row) + "</tr>" for row in rows
+    )
     return f"<table><thead><tr>{head}</tr></thead><tbody>\n{body}\n</tbody></table>"
 
 
@@ -63,6 +74,6 @@ def cell(value) -> str:
 def svg(file: Path, prefix: str) -> str:
     """The <svg> of the file, its ids made unique on the page."""
     text = file.read_text(encoding="utf-8")
-    text = text[text.index("<svg"):]
+    text = text[text.index("<svg") :]
     text = re.sub(r'(\bid="|href="#|url\(#)', lambda match: match[0] + prefix, text)
     return text

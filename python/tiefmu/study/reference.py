@@ -11,9 +11,9 @@ import numpy as np
 from .._core import Diverged, SceneError
 from .motion import FreeRun, Trajectory
 
-ORDERS = 4          # terms removed at most: h^4 .. h^7
-LEVELS = 12         # halvings at most
-MOST_STEPS = 5e5    # of one run
+ORDERS = 4  # terms removed at most: h^4 .. h^7
+LEVELS = 12  # halvings at most
+MOST_STEPS = 5e5  # of one run
 
 
 def solve(run: FreeRun, tolerance: float) -> tuple[Trajectory, tuple[float, float]]:
@@ -30,8 +30,9 @@ def solve(run: FreeRun, tolerance: float) -> tuple[Trajectory, tuple[float, floa
             raise SceneError(f"{run.scene.file}: the reference solution diverged: {error}") from None
         for order, coarser in enumerate(last[:ORDERS], 4):
             factor = 1 / (2.0**order - 1)
-            row.append(Trajectory(row[-1].v + factor * (row[-1].v - coarser.v),
-                                  row[-1].f + factor * (row[-1].f - coarser.f)))
+            row.append(
+                Trajectory(row[-1].v + factor * (row[-1].v - coarser.v), row[-1].f + factor * (row[-1].f - coarser.f))
+            )
         if last:
             error = row[-1].difference(last[-1])[:2]
             stagnates = level > 3 and error[0] > 0.5 * best_error[0]

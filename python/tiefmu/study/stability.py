@@ -15,13 +15,18 @@ BRACKET = 0.02  # how far a measured limit may lie from its closed form
 
 
 def add_parser(studies):
-    study = studies.add_parser("stability", help="measured against closed-form limits",
-                               description="Finds where methods, reactions and rules of thumb fail, and compares with "
-                               "their closed forms. Exit status 1 if one is off.")
-    study.add_argument("--out", metavar="DIR", type=Path, default=Path("out/study"),
-                       help="folder to write to (default: out/study)")
-    study.add_argument("--grid", metavar="N", type=int, default=32,
-                       help="points per axis of the map, 4 to 200 (default: 32)")
+    study = studies.add_parser(
+        "stability",
+        help="measured against closed-form limits",
+        description="Finds where methods, reactions and rules of thumb fail, and compares with "
+        "their closed forms. Exit status 1 if one is off.",
+    )
+    study.add_argument(
+        "--out", metavar="DIR", type=Path, default=Path("out/study"), help="folder to write to (default: out/study)"
+    )
+    study.add_argument(
+        "--grid", metavar="N", type=int, default=32, help="points per axis of the map, 4 to 200 (default: 32)"
+    )
     study.set_defaults(command=run)
 
 
@@ -65,14 +70,30 @@ def limit_row(limit: Limit) -> list:
     ways = [*measured.values()] + ([limit.stated] if limit.stated else [])
     off = max((abs(way / limit.closed - 1) for way in ways), default=math.nan)
     off = math.nan if any(map(math.isnan, ways)) else off
-    return [limit.item, limit.case, limit.parameter, float(limit.closed), measured.get("run", math.nan),
-            measured.get("radius", math.nan), limit.stated or math.nan, off, "ok" if off < BRACKET else "off"]
+    return [
+        limit.item,
+        limit.case,
+        limit.parameter,
+        float(limit.closed),
+        measured.get("run", math.nan),
+        measured.get("radius", math.nan),
+        limit.stated or math.nan,
+        off,
+        "ok" if off < BRACKET else "off",
+    ]
 
 
 def value_row(value: Value) -> list:
     off = abs(value.measured - value.closed) / (abs(value.closed) or 1)
-    return [value.item, value.case, value.parameter, float(value.closed), value.measured, value.tolerance,
-            "ok" if off <= value.tolerance else "off"]
+    return [
+        value.item,
+        value.case,
+        value.parameter,
+        float(value.closed),
+        value.measured,
+        value.tolerance,
+        "ok" if off <= value.tolerance else "off",
+    ]
 
 
 def write(path: Path, header: list, rows: list):
@@ -86,8 +107,9 @@ def show(limit_table: list, value_table: list, points: list):
         print(f"\n{item}. {title}")
         for row in limit_table:
             if row[0] == item:
-                measured = "  ".join(f"{name} {value:.5g}" for name, value in zip(LIMIT_COLUMNS[4:7], row[4:7])
-                                     if not math.isnan(value))
+                measured = "  ".join(
+                    f"{name} {value:.5g}" for name, value in zip(LIMIT_COLUMNS[4:7], row[4:7]) if not math.isnan(value)
+                )
                 print(f"  {row[-1]:<4}{row[1]:<56} {row[2]:<24} limit {row[3]:<10.5g} measured: {measured}")
         for row in value_table:
             if row[0] == item:
@@ -103,6 +125,7 @@ def agreeing(points: list) -> int:
 def draw(limit_table: list, folder: Path) -> Path:
     """Measured over closed-form limits, writes stability_limits.png and .svg; returns the latter."""
     import matplotlib
+
     matplotlib.use("Agg")
     matplotlib.rcParams["svg.hashsalt"] = "limits"  # the same ids in every run
     import matplotlib.pyplot as plt
@@ -112,34 +135,61 @@ def draw(limit_table: list, folder: Path) -> Path:
     axis.axvspan(1 - BRACKET, 1 + BRACKET, color="#e8eef2", label="2 % bracket")
     for column, marker, colour in ((4, "o", "#1f5fa8"), (5, "x", "#b3402e"), (6, "|", "#222222")):
         name = {4: "found by runs", 5: "spectral radius of one step", 6: "stated by the program"}[column]
-        axis.plot([row[column] / row[3] for row in rows], range(len(rows)), marker, color=colour, label=name,
-                  fillstyle="none", markersize=7)
+        axis.plot(
+            [row[column] / row[3] for row in rows],
+            range(len(rows)),
+            marker,
+            color=colour,
+            label=name,
+            fillstyle="none",
+            markersize=7,
+        )
     axis.set_yticks(range(len(rows)), [f"{row[0]}: {row[1]} ({row[2]})" for row in rows], fontsize=8)
     axis.set(xlim=(0.97, 1.03), ylim=(-0.7, len(rows) - 0.3), xlabel="measured limit / closed form  [1]")
     axis.grid(axis="x", alpha=0.3)
     figure.legend(loc="outside upper right", ncol=4, frameon=False)
     for suffix in ("png", "svg"):
-        figure.savefig(folder / f"stability_limits.{suffix}", dpi=130,
-                       metadata={"Software": None} if suffix == "png" else {"Date": None})
+        figure.savefig(
+            folder / f"stability_limits.{suffix}",
+            dpi=130,
+            metadata={"Software": None} if suffix == "png" else {"Date": None},
+        )
     plt.close(figure)
     return folder / "stability_limits.svg"
 
 
 def write_page(path: Path, limit_table: list, value_table: list, points: list, figures: list[Path]):
     both = [p for p in points if p.growth == p.growth]
-    page.write(path, "Where each method fails", [
-        "Each limit is found by bisection: by the growth of a run and, where the step is a linear map, by its spectral "
-        "radius; where the program states the limit itself, that is shown as well."], [
-        page.Section("Limits", ["A limit is right if all the ways to find it end within 2 % of the closed form."],
-                     [("Measured limits over their closed forms.", figures[0])], LIMIT_COLUMNS, limit_table),
-        page.Section("Values", ["Rates, drifts and errors that a closed form predicts."], [], VALUE_COLUMNS,
-                     value_table),
-        page.Section("Map", [
-            "Colours come from the eigenvalues of the one-step map: red where one is larger than 1, else the error of "
-            "the worst mode's complex frequency against the monolithic system. Circles and crosses are runs: of "
-            f"{len(both)}, {agreeing(both)} agree with the eigenvalues.",
-            "'loads' is always stable, and as wrong as its lumping. 'full' ends at r = 1 whatever the step. 'split' "
-            "survives every ratio as the step goes to zero; at finite steps the held load lags behind the host's "
-            "springs, which feeds energy in, and the host's damping has to outweigh it: H omega < 2 zeta (1 + r)/(r (r "
-            "+ 1/2)). Linear extrapolation moves that limit far up."],
-            [("Stability and accuracy over mass ratio and communication step.", figures[1])])])
+    page.write(
+        path,
+        "Where each method fails",
+        [
+            "Each limit is found by bisection: by the growth of a run and, where the step is a linear map, by its spectral "
+            "radius; where the program states the limit itself, that is shown as well."
+        ],
+        [
+            page.Section(
+                "Limits",
+                ["A limit is right if all the ways to find it end within 2 % of the closed form."],
+                [("Measured limits over their closed forms.", figures[0])],
+                LIMIT_COLUMNS,
+                limit_table,
+            ),
+            page.Section(
+                "Values", ["Rates, drifts and errors that a closed form predicts."], [], VALUE_COLUMNS, value_table
+            ),
+            page.Section(
+                "Map",
+                [
+                    "Colours come from the eigenvalues of the one-step map: red where one is larger than 1, else the error of "
+                    "the worst mode's complex frequency against the monolithic system. Circles and crosses are runs: of "
+                    f"{len(both)}, {agreeing(both)} agree with the eigenvalues.",
+                    "'loads' is always stable, and as wrong as its lumping. 'full' ends at r = 1 whatever the step. 'split' "
+                    "survives every ratio as the step goes to zero; at finite steps the held load lags behind the host's "
+                    "springs, which feeds energy in, and the host's damping has to outweigh it: H omega < 2 zeta (1 + r)/(r (r "
+                    "+ 1/2)). Linear extrapolation moves that limit far up.",
+                ],
+                [("Stability and accuracy over mass ratio and communication step.", figures[1])],
+            ),
+        ],
+    )

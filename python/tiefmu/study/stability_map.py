@@ -18,11 +18,11 @@ EVERY = 4  # how many grid lines lie between the points that are also decided by
 class Point:
     reaction: str
     order: int
-    ratio: float      # slave mass / mass of the four masters
-    step: float       # H omega, omega of a master alone on its spring
-    radius: float     # of the one-step map
-    growth: float     # a step, measured by a run; NaN where none was made
-    error: float      # of the worst mode's complex frequency, relative
+    ratio: float  # slave mass / mass of the four masters
+    step: float  # H omega, omega of a master alone on its spring
+    radius: float  # of the one-step map
+    growth: float  # a step, measured by a run; NaN where none was made
+    error: float  # of the worst mode's complex frequency, relative
 
     @property
     def stable(self) -> bool:
@@ -78,6 +78,7 @@ def split_limit(ratio: np.ndarray) -> np.ndarray:
 def draw(found: list[Point], folder: Path) -> Path:
     """Writes stability_map.png and .svg; returns the latter."""
     import matplotlib
+
     matplotlib.use("Agg")
     matplotlib.rcParams["svg.hashsalt"] = "map"  # the same ids in every run
     import matplotlib.pyplot as plt
@@ -87,38 +88,73 @@ def draw(found: list[Point], folder: Path) -> Path:
 
     colours = ["#1a6b54", "#5fb08c", "#c9dfae", "#f2d98b", "#b3402e"]
     labels = ["error < 0.1 %", "< 1 %", "< 10 %", "stable, error > 10 %", "unstable"]
-    titles = {("loads", 0): "loads (lumped, the host carries M + D)", ("full", 0): "full, force held",
-              ("split", 0): "split, force held", ("split", 1): "split, force extrapolated linearly"}
+    titles = {
+        ("loads", 0): "loads (lumped, the host carries M + D)",
+        ("full", 0): "full, force held",
+        ("split", 0): "split, force held",
+        ("split", 1): "split, force extrapolated linearly",
+    }
     figure, panels = plt.subplots(2, 2, figsize=(10, 8.2), sharex=True, sharey=True, layout="constrained")
     for axis, (reaction, order) in zip(panels.flat, MODES):
         own = [p for p in found if (p.reaction, p.order) == (reaction, order)]
         ratios, steps = sorted({p.ratio for p in own}), sorted({p.step for p in own})
         level = np.array([len(CLASSES) + 1 if not p.stable else np.searchsorted(CLASSES, p.error) for p in own])
-        axis.pcolormesh(ratios, steps, level.reshape(len(ratios), len(steps)).T, cmap=ListedColormap(colours),
-                        vmin=-0.5, vmax=4.5, shading="nearest", rasterized=True)
+        axis.pcolormesh(
+            ratios,
+            steps,
+            level.reshape(len(ratios), len(steps)).T,
+            cmap=ListedColormap(colours),
+            vmin=-0.5,
+            vmax=4.5,
+            shading="nearest",
+            rasterized=True,
+        )
         for p in own:
             if p.growth == p.growth:
-                axis.plot(p.ratio, p.step, "x" if p.growth > GROWS else "o", color="black", markersize=4,
-                          fillstyle="none", markeredgewidth=0.9)
+                axis.plot(
+                    p.ratio,
+                    p.step,
+                    "x" if p.growth > GROWS else "o",
+                    color="black",
+                    markersize=4,
+                    fillstyle="none",
+                    markeredgewidth=0.9,
+                )
         if reaction == "full":
             axis.axvline(1.0, color="black", linestyle="--", linewidth=1.2)
         if (reaction, order) == ("split", 0):
             axis.plot(ratios, split_limit(np.array(ratios)), color="black", linestyle="--", linewidth=1.2)
-        axis.set(xscale="log", yscale="log", title=titles[reaction, order], xlim=(ratios[0], ratios[-1]),
-                 ylim=(steps[0], steps[-1]))
+        axis.set(
+            xscale="log",
+            yscale="log",
+            title=titles[reaction, order],
+            xlim=(ratios[0], ratios[-1]),
+            ylim=(steps[0], steps[-1]),
+        )
     for axis in panels[-1]:
         axis.set_xlabel("mass ratio  r = slave mass / host mass  [1]")
     for axis in panels[:, 0]:
         axis.set_ylabel(r"communication step  $H\,\omega$  [rad]")
-    marks = [Line2D([], [], color="black", marker=m, linestyle="", markersize=5, fillstyle="none", label=text)
-             for m, text in (("o", "run: does not grow"), ("x", "run: grows"))]
+    marks = [
+        Line2D([], [], color="black", marker=m, linestyle="", markersize=5, fillstyle="none", label=text)
+        for m, text in (("o", "run: does not grow"), ("x", "run: grows"))
+    ]
     marks.append(Line2D([], [], color="black", linestyle="--", label="closed form"))
-    figure.legend(handles=[Patch(color=c, label=t) for c, t in zip(colours, labels)] + marks, ncol=4,
-                  loc="outside lower center", frameon=False)
-    figure.suptitle(f"Host of four masters on springs (omega, zeta = {ZETA:g}), slave tied in their middle:\n"
-                    "error of the worst mode's complex frequency")
+    figure.legend(
+        handles=[Patch(color=c, label=t) for c, t in zip(colours, labels)] + marks,
+        ncol=4,
+        loc="outside lower center",
+        frameon=False,
+    )
+    figure.suptitle(
+        f"Host of four masters on springs (omega, zeta = {ZETA:g}), slave tied in their middle:\n"
+        "error of the worst mode's complex frequency"
+    )
     for suffix in ("png", "svg"):
-        figure.savefig(folder / f"stability_map.{suffix}", dpi=130,
-                       metadata={"Software": None} if suffix == "png" else {"Date": None})
+        figure.savefig(
+            folder / f"stability_map.{suffix}",
+            dpi=130,
+            metadata={"Software": None} if suffix == "png" else {"Date": None},
+        )
     plt.close(figure)
     return folder / "stability_map.svg"

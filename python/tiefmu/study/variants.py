@@ -22,6 +22,7 @@ class Variant:
     """One model of a scene. formulation: "scene" leaves the ties as they are; freedoms: "all", or "translations" for
     masters without rotations; penalty: frequency of the slave on its penalty spring in units of the scene's highest,
     0 for a tie."""
+
     inertia: str = "consistent"
     geometry: str = "finite"
     formulation: str = "scene"
@@ -49,8 +50,10 @@ class Source:
         try:
             self.tables = schema.parse(read_toml(Path(path)))
             if self.tables.interface.ports:
-                raise SceneError("interface: ports: advice and studies move and load the nodes one by one; leave the ports "
-                                 "out of the scene they look at")
+                raise SceneError(
+                    "interface: ports: advice and studies move and load the nodes one by one; leave the ports "
+                    "out of the scene they look at"
+                )
         except SceneError as error:
             raise SceneError(f"{self.file}: {error}") from None
         self.scene = self.compile(self.tables)  # as it is: what is wrong with it shows here
@@ -82,8 +85,11 @@ class Source:
     def drop_rotations(self, tables: schema.SceneTables):
         """Nothing turns but the slaves of optimized ties; those of default ties lose their rotary inertia with it."""
         assembly = Assembly(tables, self.folder)
-        default = [assembly.mesh.node_id[slaves].tolist() for tie, (_, _, slaves) in zip(tables.tie, assembly.ties)
-                   if tie.formulation == "default"]
+        default = [
+            assembly.mesh.node_id[slaves].tolist()
+            for tie, (_, _, slaves) in zip(tables.tie, assembly.ties)
+            if tie.formulation == "default"
+        ]
         for table in tables.node:
             table.rotations = False if table.rotations else table.rotations
         for slaves in default:
@@ -92,8 +98,14 @@ class Source:
             table.w = None
         tables.initial = [table for table in tables.initial if table.v is not None]
 
-    def build(self, variant: Variant, method: str = "central-difference", reaction: str = "full",
-              energy: bool = False, heavy: bool = False) -> Scene:
+    def build(
+        self,
+        variant: Variant,
+        method: str = "central-difference",
+        reaction: str = "full",
+        energy: bool = False,
+        heavy: bool = False,
+    ) -> Scene:
         """The variant, compiled.
 
         energy: expose the energies. heavy: driven nodes become free ones too heavy for anything but their given
@@ -117,8 +129,11 @@ class Source:
         new.units = schema.Units()
         new.mesh = schema.Mesh(
             nodes=[(int(i), *map(float, x)) for i, x in zip(ids, a.position)],
-            segments=[[int(e), *(int(ids[n]) for n in corners if n >= 0)]
-                      for e, corners in zip(a.mesh.segment_id, a.mesh.segments)])
+            segments=[
+                [int(e), *(int(ids[n]) for n in corners if n >= 0)]
+                for e, corners in zip(a.mesh.segment_id, a.mesh.segments)
+            ],
+        )
         motion = [MOTIONS[m] for m in a.motion]
         values = {key: a.values[key].copy() for key in NODE_VALUES}
         slave = np.zeros(len(ids), bool)
@@ -130,11 +145,15 @@ class Source:
                 values[key][driven] = HEAVY * max(1.0, a.values["mass"].max(), a.values["inertia"].max())
             motion = ["free" if d else m for d, m in zip(driven, motion)]
         motion = [None if s else m for s, m in zip(slave, motion)]  # a slave's motion is that of its tie
-        new.node = [schema.Node(nodes=[int(i)], motion=m, rotations=bool(r),
-                                **{key: float(v[k]) for key, v in values.items()})
-                    for k, (i, m, r) in enumerate(zip(ids, motion, a.rotations))]
-        new.initial = [schema.Initial(nodes=[int(i)], v=v.tolist(), w=w.tolist() if r else None)
-                       for i, v, w, r in zip(ids, a.velocity, a.spin, a.rotations) if v.any() or (r and w.any())]
+        new.node = [
+            schema.Node(nodes=[int(i)], motion=m, rotations=bool(r), **{key: float(v[k]) for key, v in values.items()})
+            for k, (i, m, r) in enumerate(zip(ids, motion, a.rotations))
+        ]
+        new.initial = [
+            schema.Initial(nodes=[int(i)], v=v.tolist(), w=w.tolist() if r else None)
+            for i, v, w, r in zip(ids, a.velocity, a.spin, a.rotations)
+            if v.any() or (r and w.any())
+        ]
         for tie, (_, segments, slaves) in zip(new.tie, a.ties):
             tie.segments, tie.slaves = a.mesh.segment_id[segments].tolist(), ids[slaves].tolist()
             tie.search_distance = si("search_distance", tie.search_distance)
@@ -142,8 +161,9 @@ class Source:
         for table, (first, second) in zip(tables.spring, a.springs):
             for p, q in zip(first, second):
                 ends = {"ground": [int(ids[p])]} if q < 0 else {"nodes": [int(ids[p]), int(ids[q])]}
-                keys = ("stiffness", "damping") + (("rotational_stiffness", "rotational_damping")
-                                                   if table.kind == "bushing" else ())
+                keys = ("stiffness", "damping") + (
+                    ("rotational_stiffness", "rotational_damping") if table.kind == "bushing" else ()
+                )
                 vector = {key: np.asarray(si(key, getattr(table, key))).tolist() for key in keys}
                 new.spring.append(schema.Spring(**ends, kind=table.kind, **vector))
         new.model.gravity = np.asarray(si("gravity", tables.model.gravity)).tolist()
@@ -160,8 +180,9 @@ class Source:
         found = scene.model.report()
         top = 2 / scene.start.get("stable_time_step")[0]
         if not top > 1e-20:
-            raise SceneError(f"{self.file}: no free node is held by a spring, so a penalty has no frequency to be "
-                             "compared with")
+            raise SceneError(
+                f"{self.file}: no free node is held by a spring, so a penalty has no frequency to be compared with"
+            )
         new = self.arrays(self.changed(base), heavy=False)
         tables = {table.nodes[0]: table for table in new.node}
         slaves = dict(zip(found["slaves"]["id"].tolist(), range(len(found["slaves"]["id"]))))
@@ -176,8 +197,14 @@ class Source:
             new.mesh.nodes.append((ghost[node], *place[node]))
             k = table.mass * (variant.penalty * top) ** 2
             new.node.append(schema.Node(nodes=[ghost[node]], motion="driven", rotations=table.rotations))
-            new.spring.append(schema.Spring(nodes=[node, ghost[node]], kind="bushing", stiffness=k,
-                                            rotational_stiffness=k * table.inertia / table.mass if turns else 0.0))
+            new.spring.append(
+                schema.Spring(
+                    nodes=[node, ghost[node]],
+                    kind="bushing",
+                    stiffness=k,
+                    rotational_stiffness=k * table.inertia / table.mass if turns else 0.0,
+                )
+            )
             new.initial.append(schema.Initial(nodes=[node], v=v[s].tolist(), w=w[s].tolist() if turns else None))
             table.motion, table.rotations = "free", turns
         for tie in new.tie:
@@ -197,8 +224,10 @@ def variants(source: Source) -> list[Variant]:
     """Every tie that the scene allows and that is not the same as another one: the reference of each formulation
     first."""
     result = []
-    for formulation in ["scene", *sorted({"default", "optimized"} - (source.formulations
-                                                                     if len(source.formulations) == 1 else set()))]:
+    for formulation in [
+        "scene",
+        *sorted({"default", "optimized"} - (source.formulations if len(source.formulations) == 1 else set())),
+    ]:
         for geometry in ("finite", "small"):
             for inertia in ("consistent", "lumped"):
                 variant = Variant(inertia, geometry, formulation)
