@@ -1,4 +1,4 @@
-"""Another code's results (../shared/golden, see its README for where that code differs on purpose)."""
+"""Another code's results: golden/README.md says where they come from and where that code differs."""
 
 import csv
 import json
@@ -10,14 +10,8 @@ import tiefmu
 from in_process import Run
 from independent import Problem, Spring, exponential, quaternion_product
 
-GOLDEN = Path(__file__).resolve().parents[2] / "shared" / "golden"
+GOLDEN = Path(__file__).resolve().parent / "golden"
 KERNELS = ["a_spot0_translation", "b_spot0_rotation", "c_spot1", "d_triangles"]
-
-
-def golden(name):
-    path = GOLDEN / name
-    assert path.exists(), f"{path} is missing: these tests need the folder 'shared' beside the clone"
-    return path
 
 
 # ---- whole runs
@@ -76,7 +70,7 @@ RUNS = {
 
 def displacements(name):
     """Times (n,) and displacements (n, nodes, 3) of the golden run."""
-    with open(golden(name + ".csv")) as file:
+    with open(GOLDEN / f"{name}.csv") as file:
         table = list(csv.DictReader(file))
     nodes = len(table[0]) // 3
     u = [[[float(row[f"u[{i}].{k}"]) for k in "xyz"] for i in range(1, nodes + 1)] for row in table]
@@ -151,15 +145,9 @@ def test_what_is_behind_the_difference_of_d3m0(summing, tolerance):
 def cases():
     """(file, number of the case); without d_spot1: optimized triangles count node 3 twice there, another tie."""
     for name in KERNELS:
-        path = GOLDEN / f"{name}.json"
-        if path.exists():
-            yield from (
-                pytest.param(name, k, id=case["name"])
-                for k, case in enumerate(json.loads(path.read_text())["cases"])
-                if not case["name"].startswith("d_spot1")
-            )
-        else:
-            yield pytest.param(name, 0, id=name)  # fails with the message of `golden`
+        for k, case in enumerate(json.loads((GOLDEN / f"{name}.json").read_text())["cases"]):
+            if not case["name"].startswith("d_spot1"):
+                yield pytest.param(name, k, id=case["name"])
 
 
 class OneSlave:
@@ -256,7 +244,7 @@ class Cycle:
 
 @pytest.mark.parametrize("name, number", list(cases()))
 def test_kernels(name, number):
-    case = json.loads(golden(f"{name}.json").read_text())["cases"][number]
+    case = json.loads((GOLDEN / f"{name}.json").read_text())["cases"][number]
     velocity, spin = np.array(case["velocity"]), np.array(case["angular_velocity"])
     rotations = case["rotational_dof"] and np.any(case["inertia"][: case["n_masters"]])
     default = case["spotflag"] == 0
