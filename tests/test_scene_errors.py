@@ -511,6 +511,7 @@ KEYS = {
     ("units", "time"): one_of("s", "ms", "us", "min"),
     ("mesh",): TABLE,
     ("mesh", "file"): NAME,
+    ("mesh", "properties"): NAME,
     ("mesh", "nodes"): LIST,
     ("mesh", "segments"): LIST,
     ("node",): tables("node"),

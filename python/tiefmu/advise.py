@@ -358,8 +358,8 @@ def written(source, advice: Advice, options) -> str:
     if not c.driven:
         per = source.units.si("time_step", 1.0)
         raw.setdefault("integrator", {}).update(method=c.method, time_step=float(c.step / per), safety=SAFETY)
-    if "file" in raw["mesh"]:
-        mesh = (source.folder / raw["mesh"]["file"]).resolve()
-        raw["mesh"]["file"] = Path(os.path.relpath(mesh, options.write.resolve().parent)).as_posix()
+    for key in {"file", "properties"} & raw["mesh"].keys():
+        path = (source.folder / raw["mesh"][key]).resolve()
+        raw["mesh"][key] = Path(os.path.relpath(path, options.write.resolve().parent)).as_posix()
     head = f"# {Path(options.scene).name} as advised for an error of {options.tolerance:g}"
     return "\n".join([head, *(f"# {line}" for line in advice.lines(source)[1:]), toml.text(raw)])

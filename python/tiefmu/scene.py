@@ -13,6 +13,9 @@ import numpy as np
 
 from . import _core, mesh, schema
 from ._core import SceneError
+from .mesh import properties
+from .mesh.properties import MOTIONS
+from .mesh.properties import NUMBERS as NODE_VALUES
 from .schema import suggestion
 from .units import Units
 
@@ -20,9 +23,6 @@ if sys.version_info >= (3, 11):
     import tomllib
 else:
     import tomli as tomllib
-
-MOTIONS = ["driven", "free", "fixed"]  # as enum class Motion in src/scene.hpp
-NODE_VALUES = ["mass", "inertia", "stiffness", "rotational_stiffness"]
 
 
 class Scene:
@@ -109,10 +109,13 @@ class Assembly:
         n = len(self.mesh.node_id)
         self.position = self.units.si("position", self.mesh.position)
         self.motion = np.zeros(n, np.uint8)
-        self.motion_table = np.zeros(n, int)  # number of the table that names the node and sets its motion, or 0
+        self.motion_table = np.zeros(n, int)  # what names the node and sets its motion: a node table's number, or 0,
+        # or -1 for the table of properties
         self.rotations = np.zeros(n, bool)
         self.values = {key: np.zeros(n) for key in NODE_VALUES}
         self.velocity, self.spin = np.zeros((n, 3)), np.zeros((n, 3))
+        if tables.mesh.properties is not None:
+            self.apply_properties(folder / tables.mesh.properties, tables.mesh.properties)
         for number, table in enumerate(tables.node, 1):
             self.apply_node_table(f"node table {number}", number, table)
         self.ties = self.resolve_ties()
@@ -130,6 +133,16 @@ class Assembly:
     def segments(self, where: str, wanted) -> np.ndarray:
         m = self.mesh
         return select(where, wanted, "segment", m.segment_id, m.segment_sets, m.node_sets)
+
+    def apply_properties(self, path: Path, name: str):
+        for key, column in properties.read(path, name, self.mesh.node_id).items():
+            if key == "motion":
+                self.motion[column.nodes] = column.values
+                self.motion_table[column.nodes] = -1
+            elif key == "rotations":
+                self.rotations[column.nodes] = column.values
+            else:
+                self.values[key][column.nodes] = self.units.si(key, column.values)
 
     def apply_node_table(self, where: str, number: int, table: schema.Node):
         nodes = self.nodes(f"{where}: nodes", table.nodes)
@@ -153,11 +166,13 @@ class Assembly:
             names.add(table.name)
             segments = self.segments(f"{where}: segments", table.segments)
             slaves = self.nodes(f"{where}: slaves", table.slaves)
-            fixed = slaves[(self.motion[slaves] == MOTIONS.index("fixed")) & (self.motion_table[slaves] > 0)]
+            fixed = slaves[(self.motion[slaves] == MOTIONS.index("fixed")) & (self.motion_table[slaves] != 0)]
             if len(fixed):
+                table_number = self.motion_table[fixed[0]]
+                place = f"node table {table_number}" if table_number > 0 else self.tables.mesh.properties
                 raise SceneError(
                     f"{where}: slave {self.mesh.node_id[fixed[0]]}: constrained twice, by the tie and by "
-                    f"motion = 'fixed' in node table {self.motion_table[fixed[0]]}; take it out of one"
+                    f"motion = 'fixed' in {place}; take it out of one"
                 )
             ties.append((table.name, segments, slaves))
         return ties

@@ -179,6 +179,7 @@ class Units(Table):
 
 class Mesh(Table):
     file: Name | None = None
+    properties: Name | None = None
     nodes: list[Annotated[tuple[Id, Coordinate, Coordinate, Coordinate], Field(strict=False)]] = []
     segments: list[Annotated[list[Id], Field(min_length=4, max_length=5)]] = []
 

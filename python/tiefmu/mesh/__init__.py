@@ -15,9 +15,9 @@ from pathlib import Path
 
 import numpy as np
 
+from .._core import SceneError
+from ..schema import LARGEST
 from . import abaqus
-from ._core import SceneError
-from .schema import LARGEST
 
 QUADRATIC = {"triangle6", "triangle7", "quad8", "quad9"}
 CORNERS = {"triangle": 3, "quad": 4}

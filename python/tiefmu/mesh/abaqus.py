@@ -7,8 +7,8 @@ wrong block of elements - all without a word.
 import re
 from pathlib import Path
 
-from ._core import SceneError
-from .schema import shortened
+from .._core import SceneError
+from ..schema import shortened
 
 # Three- and four-node elements that are surfaces: shells, membranes, surface, rigid and plane elements. The digit
 # behind the family's name counts the nodes.
