@@ -175,8 +175,8 @@ void Instance::exitInitializationMode() {
   state = stepComplete;
 }
 
-// Seed (3) for what the host moves: it carries the declared mass and the lumped addition (THEORY 5), on the declared
-// stiffness and the slaves'. Where no mass is declared nothing is known.
+// Theory (6.3) for what the host moves: it carries its declared mass and the lumped addition (theory 5), on the
+// declared stiffness and the slaves'. Where no mass is declared nothing is known.
 void Instance::findHostStep() {
   const Model& model = simulation.model();
   hostStep = std::numeric_limits<double>::infinity();

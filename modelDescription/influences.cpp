@@ -188,7 +188,7 @@ void Influences::motion(const Segment& s, int slave, List& v, List& w, List& x) 
   }
 }
 
-// How b of a slave (THEORY 2) depends on one corner: its translational part on v and w, its rotational part on v.
+// How b of a slave (theory 2) depends on one corner: its translational part on v and w, its rotational part on v.
 Influences::Bias Influences::bias(const Segment& s, int slave, int corner) const {
   Bias b;
   if (!model.finite()) return b;
@@ -291,7 +291,7 @@ void Influences::addSpring(const Spring& spring, const std::vector<List>& v, con
   apply(spring.b, b);
 }
 
-// T^T f_s (THEORY 3)
+// T^T f_s (theory 3)
 void Influences::findReactions() {
   List force, moment;
   CornerMap maps[4];
@@ -434,7 +434,7 @@ Influences::Resultant Influences::resultant(std::size_t port, bool inertial) con
   return sum;
 }
 
-// D_i of the parameters (THEORY 4, lumped)
+// D_i of the parameters (theory 4, lumped)
 void Influences::findAdditions() {
   eachSegment([&](const Segment& s) {
     for (int slave = s.first; slave < s.last; ++slave) {
@@ -475,7 +475,7 @@ void Influences::findInertialLoads() {
   }
 }
 
-// T^T M_s (T q'' + b) of the slaves on one segment (THEORY 4, consistent)
+// T^T M_s (T q'' + b) of the slaves on one segment (theory 4, consistent)
 void Influences::addInertialLoads(const Segment& s) {
   const int n = s.bodies;
   CornerMap maps[4], mass[4][4] = {};

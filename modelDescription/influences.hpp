@@ -26,7 +26,7 @@ inline void add(List& to, Pattern left, const List& from) {
   for (const Entry& e : from) add(to, left * e.pattern, e.known);
 }
 
-// The part of one corner in the motion of a slave, THEORY 2: v_s += vv v + vw w, w_s += wv v + ww w.
+// The part of one corner in the motion of a slave, theory 2: v_s += vv v + vw w, w_s += wv v + ww w.
 struct CornerMap { Pattern vv, vw, wv, ww; };
 
 // Bodies are the independent nodes and, numbered on from there, the ports of driven nodes. A segment whose corners all

@@ -38,7 +38,7 @@ std::vector<Block> variables(const Model& model, const Layout& layout);
 std::string variableName(const Block& block, std::size_t element, int component);
 
 // Throws SceneError ("interface: expose: unknown name 'x'; known: ...") unless every name of settings.expose and
-// settings.hide is one of INTERFACE.
+// settings.hide is one of docs/interface.md.
 void checkInterface(const Scene& scene);
 
 }  // namespace tiefmu

@@ -1,4 +1,4 @@
-// The inertia that accelerates the free nodes (THEORY 4): lumped additions, or the consistent mass matrix.
+// The inertia that accelerates the free nodes (theory 4): lumped additions, or the consistent mass matrix.
 #pragma once
 
 #include <memory>
@@ -9,11 +9,12 @@
 
 namespace tiefmu {
 
-// D_i of every node: mass (kg) per node and inertia (kg m2) per rotating node. [seed (1), (2), (7), (8)]
+// D_i of every node: mass (kg) per node and inertia (kg m2) per rotating node. [theory (4.1), (4.2)]
 void lumpedAdditions(const Model& model, const double* slaveMass, const double* slaveInertia, double* mass,
                      double* inertia);
 
-// Nodal stiffness K_i (N/m) and Kr_i (N m/rad): declared, plus the springs', plus the slaves' shares. [seed (3)]
+// Nodal stiffness K_i (N/m) and Kr_i (N m/rad): declared, plus the springs', plus the slaves' shares. [theory (6.1),
+// (6.2)]
 void nodalStiffness(const Model& model, double* translation, double* rotation);
 
 // The matrix M_m + T^T M_s T of the free nodes, and solutions with it. A solution is a function of geometry, right side

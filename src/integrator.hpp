@@ -1,4 +1,4 @@
-// One explicit step of a simulation's free nodes (THEORY 6).
+// One explicit step of a simulation's free nodes (theory 6).
 #pragma once
 
 #include <vector>
@@ -7,7 +7,7 @@
 
 namespace tiefmu {
 
-// Noh & Bathe 2013: the parameters that follow from the splitting ratio p.
+// [Noh & Bathe 2013], theory (6.6): the parameters that follow from the splitting ratio p.
 namespace nohBathe {
 constexpr double p = 0.54;
 constexpr double q1 = (1 - 2 * p) / (2 * p * (1 - p));

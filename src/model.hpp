@@ -142,7 +142,7 @@ struct Model {
   bool anyDriven() const;
   std::size_t drivenPorts() const;
   bool isMaster(int group) const { return group % 2 == 0; }
-  bool exposes(const char* name) const;  // is this name of INTERFACE's expose list asked for?
+  bool exposes(const char* name) const;  // is this name of `expose` asked for?
 
   bool needsPositions() const;  // node positions are states (or inputs)
   bool finite() const { return settings.geometry == Geometry::finite; }

@@ -9,7 +9,7 @@
 namespace tiefmu {
 namespace {
 
-// The rotation R with the largest trace of R^T H, by the eigenvector of Horn's matrix (Horn 1987): for H = sum x x0^T
+// The rotation R with the largest trace of R^T H, by the eigenvector of Horn's matrix [Horn 1987]: for H = sum x x0^T
 // the one that turns the x0 closest to the x.
 Mat3 closestRotation(const Mat3& h) {
   const Vec3 axis(h(2, 1) - h(1, 2), h(0, 2) - h(2, 0), h(1, 0) - h(0, 1));
@@ -107,7 +107,7 @@ void Ports::moveNodes(std::size_t p, bool places) {
   }
 }
 
-// The rotation vector of a w(t) that moves is h w_mean - h^2/12 w(tau) x w(tau + h) to fourth order (Magnus 1954), and
+// The rotation vector of a w(t) that moves is h w_mean - h^2/12 w(tau) x w(tau + h) to fourth order [Magnus 1954], and
 // h w exactly where w stands.
 Ports::Motion Ports::motion(const InputCurve& inputs, std::size_t p, double tau, double h) const {
   const std::size_t v = layout_[Field::portVelocity].offset + 3 * p, w = layout_[Field::portSpin].offset + 3 * p;

@@ -2,8 +2,8 @@
 //
 // A port of driven nodes moves them, v_i = v + w x r_i with arms r_i = R r_i0, R advanced by the exponential map, and
 // sums what ties and springs do to them: f = sum f_i, t = sum t_i + r_i x f_i.
-// A port of slaves follows their mean rigid motion (THEORY 2, optimized, with N slaves in place of n masters) and
-// spreads its load by the transpose (THEORY 3):
+// A port of slaves follows their mean rigid motion (theory 2, optimized, with N slaves in place of n masters) and
+// spreads its load by the transpose (theory 3):
 //   v = (1/N) sum v_s + w x e        w = J^-1 (sum r_s x v_s + L2 sum w_s)
 //   f_s = f/N + A x r_s              m_s = L2 A        A = J^-1 (t + e x f)
 //   J = sum ((r_s.r_s) 1 - r_s r_s^T + L2 1)

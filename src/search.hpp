@@ -1,4 +1,4 @@
-// Which segment holds a slave (THEORY 7).
+// Which segment holds a slave (theory 7).
 #pragma once
 
 #include <array>

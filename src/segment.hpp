@@ -1,4 +1,4 @@
-// One master segment: shape functions, the projection of a point, and the inertia of its nodes (THEORY 7 and 1).
+// One master segment: shape functions, the projection of a point, and the inertia of its nodes (theory 7 and 1).
 // `n` is 4 (bilinear quad, xi and eta in [-1, 1]) or 3 (plane triangle, Phi = (1 - xi - eta, xi, eta)).
 #pragma once
 

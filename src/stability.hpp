@@ -1,4 +1,4 @@
-// How large a step may be (THEORY 6).
+// How large a step may be (theory 6).
 #pragma once
 
 #include <vector>
@@ -11,7 +11,7 @@ namespace tiefmu {
 // Euler with the damping force of the lagged half step that is 2/omega (sqrt(1 + z^2) - z), z = c / (2 omega).
 double stableStep(Method method, double omega, double c);
 
-// Seed (3): the smallest sqrt(2 m/K), sqrt(2 I/Kr) over the free master nodes, s (1e30: no stiffness).
+// Theory (6.3): the smallest sqrt(2 m/K), sqrt(2 I/Kr) over the free master nodes, s (1e30: no stiffness).
 double nodalStep(const Model& model, const double* addedMass, const double* addedInertia, const double* stiffness,
                  const double* rotationalStiffness);
 

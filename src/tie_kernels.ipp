@@ -404,7 +404,7 @@ TIEFMU_INLINE void large(const Lanes& a2, Lanes& s, Lanes& c) {
   }
 }
 
-// d + sin(a)/a (angle x d) + (1 - cos a)/a^2 angle x (angle x d), a = |angle| [Rodrigues], at its length, of which
+// d + sin(a)/a (angle x d) + (1 - cos a)/a^2 angle x (angle x d), a = |angle| [Rodrigues 1840], at its length, of which
 // `inverse` is 1/square.
 template <class N> TIEFMU_INLINE Three<N> turned(const Three<N>& angle, const Three<N>& d, const N& inverse) {
   const N a2 = dot(angle, angle);

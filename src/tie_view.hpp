@@ -7,7 +7,7 @@
 
 namespace tiefmu {
 
-// How a slave follows its segment (THEORY 2).
+// How a slave follows its segment (theory 2).
 enum class Coupling : std::uint8_t {
   rotation,     // default formulation, every master of the segment turns: v_s = v_P + w_P x d
   meanMotion,   // optimized formulation: v_s = v_C + w x d

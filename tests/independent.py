@@ -1,4 +1,4 @@
-"""The tie once more, from THEORY alone: dense, slow and short. Shares no code with the project.
+"""The tie once more, from docs/theory.md alone: dense, slow and short. Shares no code with the project.
 
 Kernels (shape to springs) work on one segment or spring; `Problem` assembles a scene given as the dict of a TOML file
 (inline mesh, SI, sets by ids or "all") and `Problem.solve` integrates it to rounding. Degrees of freedom are ordered
@@ -14,7 +14,7 @@ def skew(u):
     return np.array([[0, -u[2], u[1]], [u[2], 0, -u[0]], [-u[1], u[0], 0]])
 
 
-# ---- one segment (THEORY 2, 4, 7) ------------------------------------------------------------------------------------
+# ---- one segment (theory 2, 4, 7) ------------------------------------------------------------------------------------
 
 
 def shape(n, xi, eta):
@@ -81,7 +81,7 @@ def project(corners, s):
 
 
 def clamp(corners, projection):
-    """Phi for masses, inertias and stiffnesses (THEORY 4)."""
+    """Phi for masses, inertias and stiffnesses (theory 4)."""
     if len(corners) == 3:
         phi = np.maximum(projection.phi, 0)
         return phi / phi.sum()
@@ -135,7 +135,7 @@ def default_bias(phi, spins, d):
 
 
 def optimized_bias(corners, velocities, d):
-    """b (6,) of THEORY 2, with dIbar/dt written out."""
+    """b (6,) of theory 2, with dIbar/dt written out."""
     _, r, ibar = mean_inertia(corners)
     rate = velocities - velocities.mean(axis=0)
     ibar_rate = sum(2 * ri @ ui * np.eye(3) - np.outer(ri, ui) - np.outer(ui, ri) for ri, ui in zip(r, rate))
@@ -145,7 +145,7 @@ def optimized_bias(corners, velocities, d):
 
 
 def lumped(corners, projection, offset, optimized, mass, inertia):
-    """Added (mass, inertia) per master of the segment, (n, 2) (THEORY 4); offset = d, a length. Also for seed (3)."""
+    """Added (mass, inertia) per master of the segment, (n, 2) (theory 4); offset = d. Also for theory (6.3)."""
     turned = inertia + mass * offset**2
     if optimized:
         n = len(corners)
@@ -154,7 +154,7 @@ def lumped(corners, projection, offset, optimized, mass, inertia):
     return np.column_stack([phi * mass, phi * turned])
 
 
-# ---- search (THEORY 7), all segments ---------------------------------------------------------------------------------
+# ---- search (theory 7), all segments ---------------------------------------------------------------------------------
 
 
 def no_area(corners):
@@ -554,7 +554,7 @@ class Problem:
         assert answer.success, answer.message
         return [self.evaluate(t, y, inputs) for t, y in zip(times, answer.y.T)]
 
-    # -- stability (THEORY 6)
+    # -- stability (theory 6)
 
     def omega_max(self):
         """rad/s: the highest frequency of the free nodes at the start."""

@@ -487,7 +487,7 @@ def test_report_of_the_example(weld):
 
 
 def test_added_inertia_adds_up_over_slaves(weld):
-    """Rows per slave (computed for the report) against the solver's own sums per master, THEORY 4."""
+    """Rows per slave (computed for the report) against the solver's own sums per master, theory 4."""
     weld["mesh"]["nodes"] += [[102, 0.12, 0.04, 0.01], [103, 0.05, 0.02, -0.02]]
     weld["node"] = [
         {"nodes": "all", "rotations": True, "mass": 1.0, "inertia": 1e-3},

@@ -623,7 +623,7 @@ STIFF = {  # a driven shell quad with declared mass and stiffness: steps above s
 
 
 def test_a_communication_step_too_long_for_the_masters_is_warned_of_once(tmp_path):
-    limit = np.sqrt(2 * (2.0 + 4.0 / 4) / (4e4 + 8e4 / 4))  # seed (3), with the mass that the slave adds
+    limit = np.sqrt(2 * (2.0 + 4.0 / 4) / (4e4 + 8e4 / 4))  # theory (6.3), with the mass that the slave adds
     stiff = Fmu(STIFF, tmp_path)
     instance = Instance(stiff, logging=True).start()
 

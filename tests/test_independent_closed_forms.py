@@ -1,4 +1,4 @@
-"""The closed forms of THEORY 8."""
+"""The closed forms of theory 8."""
 
 import numpy as np
 import pytest
@@ -76,7 +76,7 @@ def test_highest_frequency(inertia, limit):
 
 
 def test_lumped_inertia_never_holds_less_energy():
-    """THEORY 4: lambda bounds the slave's kinetic energy for every motion; 1000 random segments."""
+    """Theory 4: lambda bounds the slave's kinetic energy for every motion; 1000 random segments."""
     rng = np.random.default_rng(0)
     closest = np.inf
     for k in range(1000):

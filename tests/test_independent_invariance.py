@@ -40,7 +40,7 @@ def test_turned_scene_gives_the_turned_answer(formulation, rotations, inertia):
 @pytest.mark.parametrize("seed", range(20))
 @pytest.mark.parametrize("n", [4, 3])
 def test_added_mass_of_a_turned_segment_is_the_same(seed, n):
-    """THEORY 9: 0.415 to 1.148 g elsewhere."""
+    """Theory 9: 0.415 to 1.148 g elsewhere."""
     rng = np.random.default_rng(seed)
     scene = one_segment(rng, n, "optimized", False)
     added = []

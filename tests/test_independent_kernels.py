@@ -1,4 +1,4 @@
-"""The solver's kernels on arrays: any number of slaves a segment, transposes, projections, limits (THEORY 2-7)."""
+"""The solver's kernels on arrays: any number of slaves a segment, transposes, projections, limits (theory 2-7)."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Slave motion, reactions and projection of random segments against THEORY 2 to 4 and 7 computed by independent.py."""
+"""Slave motion, reactions and projection of random segments against theory 2 to 4 and 7 computed by independent.py."""
 
 import numpy as np
 import pytest
@@ -154,7 +154,7 @@ def test_projection_is_exact_on_warped_quads(seed):
 
 @pytest.mark.parametrize("formulation, expected", [("default", 1.0), ("optimized", 0.0)])
 def test_hourglass_work_on_a_flat_quad(formulation, expected):
-    """THEORY 8: on the unit square sum h_i f_i = xi eta F by the default, nothing by the optimized formulation."""
+    """Theory 8: on the unit square sum h_i f_i = xi eta F by the default, nothing by the optimized formulation."""
     s, t, force = 0.4, -0.7, np.array([1.0, -2.0, 3.0])
     scene = {
         "mesh": {

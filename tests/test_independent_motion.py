@@ -167,7 +167,7 @@ def test_energy_of_consistent_inertia_is_constant_to_the_order(method, order, fo
 
 @pytest.mark.parametrize("formulation", ["default", "optimized"])
 def test_true_energy_drifts_with_lumped_inertia_only(formulation):
-    """THEORY 4: with m_s/m_i = 0.7 and an offset of 0.4 edges by per cents, whatever the step."""
+    """Theory 4: with m_s/m_i = 0.7 and an offset of 0.4 edges by per cents, whatever the step."""
     rotations = formulation == "default"
     scene = {
         "mesh": {

@@ -1,4 +1,4 @@
-"""Large rotations: the offset keeps its length, free flight keeps its momentum (THEORY 2, 8)."""
+"""Large rotations: the offset keeps its length, free flight keeps its momentum (theory 2, 8)."""
 
 import numpy as np
 import pytest
@@ -82,7 +82,7 @@ def free_flight(formulation, inertia, seed=3):
 @pytest.mark.parametrize("inertia", ["consistent", "lumped"])
 def test_free_flight(formulation, inertia):
     """Linear momentum, to rounding where it is linear in the velocities; with consistent inertia angular momentum and
-    energy, too (THEORY 8)."""
+    energy, too (theory 8)."""
     scene = free_flight(formulation, inertia)
     problem, run = Problem(scene), Run(scene)
     added = problem.added()

@@ -1,4 +1,4 @@
-"""Both searches against trying every segment, on random and on contrived slaves (THEORY 7)."""
+"""Both searches against trying every segment, on random and on contrived slaves (theory 7)."""
 
 import numpy as np
 import pytest

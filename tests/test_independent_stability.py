@@ -1,4 +1,4 @@
-"""Time step limits: 2/omega_max against an eigenvalue solver, the nodal step against seed (3), and both in use."""
+"""Time step limits: 2/omega_max against an eigenvalue solver, the nodal step against theory (6.3), and both in use."""
 
 import numpy as np
 import pytest
@@ -25,7 +25,7 @@ def test_stable_step_is_two_over_omega_max(seed, inertia, formulation, rotations
 
 @forms
 @pytest.mark.parametrize("seed", range(6))
-def test_nodal_step_is_seed_3(seed, formulation, rotations):
+def test_nodal_step(seed, formulation, rotations):
     """Declared stiffness only: K_i + sum Phi_i K_s and Kr_i + sum Phi_i (Kr_s + K_s d^2), or the optimized shares."""
     rng = np.random.default_rng(seed)
     scene = structure(rng, formulation, rotations, "lumped")
@@ -62,7 +62,7 @@ def test_nodal_step_is_seed_3(seed, formulation, rotations):
 
 
 def test_nodal_step_is_no_bound_with_offset():
-    """THEORY 6: massless masters, a spring from the slave to an equal free mass: dt_crit/dt_nodal = sqrt(2/3)."""
+    """Theory 6: massless masters, a spring from the slave to an equal free mass: dt_crit/dt_nodal = sqrt(2/3)."""
     scene = {
         "mesh": {
             "nodes": [[1, -1, -1, 0], [2, 1, -1, 0], [3, 1, 1, 0], [4, -1, 1, 0], [5, 0, 0, 0.3], [6, 1, 0, 0.3]],
@@ -114,7 +114,7 @@ def test_motion_stays_bounded_near_the_limit(speed, safety, method, formulation,
 
 
 def test_a_rivet_between_slaves_outside_their_segments():
-    """THEORY 9: elsewhere 1e38 by cycle 33."""
+    """Theory 9: elsewhere 1e38 by cycle 33."""
     scene = {
         "mesh": {
             "nodes": [

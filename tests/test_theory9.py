@@ -1,4 +1,4 @@
-"""THEORY 9, one test per row: where existing codes fail, and what this program does instead."""
+"""Theory 9, one test per row: where existing codes fail, and what this program does instead."""
 
 import numpy as np
 import pytest
@@ -27,7 +27,7 @@ def refusal(scene) -> str:
 
 
 def test_optimized_without_rotational_freedom_is_optimized():
-    """The loads are those of THEORY 3 for the optimized formulation, not those of the default one."""
+    """The loads are those of theory 3 for the optimized formulation, not those of the default one."""
     force = np.array([1.0, -2.0, 3.0])
 
     def loads(formulation):

@@ -1,6 +1,6 @@
 """A master of our own for a host and a tie whose loads depend on the host's accelerations, and those on the loads.
 
-With reaction = "full" the loop between the two has no delay in it (THEORY 5). The master breaks it in three ways; all
+With reaction = "full" the loop between the two has no delay in it (theory 5). The master breaks it in three ways; all
 errors are against the same system in one scene, integrated by the same method with the same step, so that they are
 errors of the coupling alone.
 """
@@ -109,7 +109,7 @@ def held(host, tie, time, loads):
 
 def by_rollback(passes: int, share: float):
     """Steps the host on trial, shows the tie the acceleration that came of it, and puts the host back. share: of the
-    tie's answer in the next guess; 1/(1 + r) is exact at once where all motions have the mass ratio r (THEORY 5)."""
+    tie's answer in the next guess; 1/(1 + r) is exact at once where all motions have the mass ratio r (theory 5)."""
 
     def solve(host, tie, time, loads):
         state, before = host.save(), host.get(SPEEDS)

@@ -179,7 +179,7 @@ def advise(source, inputs: Path | None, tolerance: float) -> Advice:
 
 
 def mass_ratio(source) -> float:
-    """Largest eigenvalue of (host's mass)^-1 (mass that the tie adds), THEORY 5; inf where a host node has none."""
+    """Largest eigenvalue of (host's mass)^-1 (mass that the tie adds), theory 5; inf where a host node has none."""
     from .study.variants import Variant
 
     scene = source.build(Variant())

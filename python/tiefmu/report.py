@@ -18,7 +18,7 @@ def report(scene: Scene) -> dict:
 
     Keys are those of the JSON. Per slave: xi, eta of the projection and its distance; d = |offset|, to the
     projection (default) or the segment's barycentre (optimized); `weights` as the tie uses them (Phi, or 1/n);
-    `added`: lumped mass and inertia on each master (THEORY 4). A step that nothing limits is 1e30; an infinite `cond`
+    `added`: lumped mass and inertia on each master (theory 4). A step that nothing limits is 1e30; an infinite `cond`
     or `lambda` is null.
     """
     found = scene.model.report()
@@ -71,7 +71,7 @@ def slave_rows(scene: Scene, found: dict, order: np.ndarray) -> list[dict]:
     rotary = inertia + m * s["d"] ** 2  # I_s + m_s d^2
     optimized = s["coupling"] == found["couplings"].index("meanMotion")
     turns_masters = s["coupling"] == found["couplings"].index("rotation")
-    # Lumped additions: seed (1), (2), and (7), (8) with lambda for the matrix.
+    # Lumped additions, theory (4.1) and (4.2).
     corner = np.arange(4) < n[:, None]
     share = np.where(optimized[:, None], corner / n[:, None], s["weights"])
     with np.errstate(invalid="ignore", over="ignore"):  # lambda may be infinite where no optimized tie uses it
@@ -192,7 +192,7 @@ def port_rows(scene: Scene, found: dict) -> list[dict]:
 
 
 def nodal_step(mass: float, stiffness: float) -> float:
-    """Seed (3): sqrt(2 m/K); 1e30 where nothing limits it."""
+    """sqrt(2 m/K), theory (6.3); 1e30 where nothing limits it."""
     return (2 * mass / stiffness) ** 0.5 if stiffness > 0 else 1e30
 
 

@@ -208,7 +208,7 @@ class Study:
         return 2 / float(self.source.compile(tables).start.get("stable_time_step")[0])
 
     def tables(self, reaction: str) -> schema.SceneTables:
-        """SI tables of the scene in this reaction mode, lumped where that is the seed's."""
+        """SI tables of the scene in this reaction mode, with lumped inertia in `loads`."""
         tables = self.base.model_copy(deep=True)
         if reaction == "spring-damper":
             tables.model.reaction, tables.model.inertia = "loads", "lumped"

@@ -92,7 +92,7 @@ def coupled(
     share: float = 1.0,
 ) -> Coupling:
     """The scene's host at this step. omega, zeta: of each master alone on its ground spring (rad/s, 1); share: the part
-    of D that the host carries where the reaction asks for D (THEORY 5)."""
+    of D that the host carries where the reaction asks for D (theory 5)."""
     tie = InProcess(scene)
     carried = 0.0 if reaction == "full" else share
     return Coupling(

@@ -1,4 +1,4 @@
-"""Where each method fails: the cases of the stability study, with their closed forms (THEORY 4 to 8)."""
+"""Where each method fails: the cases of the stability study, with their closed forms (theory 4 to 8)."""
 
 import numpy as np
 
@@ -34,7 +34,7 @@ def limits() -> list[Limit]:
 
 
 def full_limits() -> list[Limit]:
-    """r = m / 4 M, whatever the step: 1, 1/2, 1/(2^(k+1) - 1) (THEORY 5)."""
+    """r = m / 4 M, whatever the step: 1, 1/2, 1/(2^(k+1) - 1) (theory 5)."""
     schemes = [
         ("held", 0, False, 1.0),
         ("BDF2-differenced velocity", 0, True, 1 / 2),
@@ -357,7 +357,7 @@ def orientation_values() -> list[Value]:
         for name, tolerance in (("added mass", 1e-12), ("limit", 1e-9))
     ]
     ratio = spreads["row sum / lambda"]
-    # THEORY 4: from 0.04 to 1.35 as the segment turns; a bound would never be below 1.
+    # Theory 4: from 0.04 to 1.35 as the segment turns; a bound would never be below 1.
     return [
         *found,
         Value("6", "row-sum rule, smallest", "row sum / lambda", 0.04, float(min(ratio)), 0.1),
