@@ -19,6 +19,7 @@
 #include <string>
 #include <vector>
 
+#include "compile.hpp"
 #include "search.hpp"
 #include "simulation.hpp"
 #include "timing.hpp"

@@ -13,9 +13,9 @@
 namespace tiefmu {
 
 // Independent nodes (masters and points) are sorted into these groups, by ascending id inside each (along a curve where
-// ids are scattered: localOrder). Rotating nodes
-// come first and free ones stand together, so that every array below is a contiguous slice of its field:
-// rotating = [0, begin[freeMaster]), free = [begin[rotatingFreeMaster], begin[fixedMaster]).
+// ids are scattered: localOrder). Rotating nodes come first and free ones stand together, so that every array below is
+// a contiguous slice of its field: rotating = [0, begin[freeMaster]), free = [begin[rotatingFreeMaster],
+// begin[fixedMaster]).
 enum NodeGroup : int {
   rotatingDrivenMaster,
   rotatingDrivenPoint,
@@ -40,7 +40,7 @@ struct TieGroup {
   std::vector<int> node;       // corners per segment: independent node indices
   std::vector<int> begin;      // segments + 1: slaves of segment e are firstSlave + [begin[e], begin[e+1])
   std::vector<double> weight;  // corners per slave: Phi at the projection
-  std::vector<int> partEnd;    // parts end at these segments, share no node and are followed by their border
+  std::vector<int> partEnd;    // ends of Partition: parts for threads, then the separator
   int segments() const { return static_cast<int>(begin.size()) - 1; }
   int slaves() const { return begin.back(); }
 };
@@ -149,8 +149,5 @@ struct Model {
   bool shareable() const;  // large enough that threads find parts to share
   bool accelerationInputs() const { return settings.reaction != Reaction::loads; }
 };
-
-// Searches, checks and sorts. Throws SceneError with one line naming table and id.
-Model compile(const Scene& scene);
 
 }  // namespace tiefmu

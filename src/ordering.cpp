@@ -7,8 +7,6 @@
 namespace tiefmu {
 namespace {
 
-constexpr int segmentsAPart = 1024, mostParts = 32;
-
 double walk(const std::vector<Vec3>& points, const std::vector<int>& order) {
   double length = 0;
   for (std::size_t k = 1; k < order.size(); ++k) length += (points[order[k]] - points[order[k - 1]]).norm();
@@ -45,29 +43,6 @@ std::vector<int> localOrder(const std::vector<Vec3>& points) {
   std::vector<int> order = given;
   std::sort(order.begin(), order.end(), [&](int a, int b) { return code[a] != code[b] ? code[a] < code[b] : a < b; });
   return walk(points, given) <= 4 * walk(points, order) ? given : order;
-}
-
-Parts split(const std::vector<int>& node, int corners) {
-  const int segments = static_cast<int>(node.size()) / corners;
-  const int parts = std::clamp(segments / segmentsAPart, 1, mostParts);
-  const auto partOf = [&](int e) { return static_cast<int>(static_cast<std::int64_t>(e) * parts / segments); };
-  constexpr int nobody = -1, several = -2;
-  std::vector<int> owner(node.empty() ? 0 : *std::max_element(node.begin(), node.end()) + 1, nobody);
-  for (int k = 0; k < static_cast<int>(node.size()); ++k) {
-    int& of = owner[node[k]];
-    const int part = partOf(k / corners);
-    of = of == nobody || of == part ? part : several;
-  }
-  Parts result;
-  std::vector<int> border;
-  for (int e = 0; e < segments; ++e) {
-    const auto shared = [&](int n) { return owner[n] == several; };
-    const bool inside = std::none_of(node.begin() + corners * e, node.begin() + corners * (e + 1), shared);
-    (inside ? result.order : border).push_back(e);
-    if (e + 1 == segments || partOf(e + 1) != partOf(e)) result.end.push_back(static_cast<int>(result.order.size()));
-  }
-  result.order.insert(result.order.end(), border.begin(), border.end());
-  return result;
 }
 
 }  // namespace tiefmu

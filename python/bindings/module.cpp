@@ -11,6 +11,7 @@
 #include <string>
 #include <unordered_map>
 
+#include "compile.hpp"
 #include "resource.hpp"
 #include "segment.hpp"
 #include "simulation.hpp"
