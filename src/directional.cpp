@@ -31,7 +31,7 @@ struct Dynamics::Change {
 void Dynamics::changeAccelerations(Change& c, const double* da, const double* dz, const double* a, const double* v,
                                    const double* w, const double* du, const double* dturn, const double* dx) {
   eachGroup([&](const TieGroup& group, SegmentRange range, TieGeometry shape, std::size_t) {
-    if (da) follow(group, range, shape, da, dz, c.as.data(), c.zs.data());
+    if (da) mapMotion(group, range, shape, da, dz, c.as.data(), c.zs.data());
     if (dx && a) followChange(group, shape, dx, a, c.as.data(), c.zs.data());
     if (dx && bias_) biasChange(group, shape, dx, v, c.as.data(), c.zs.data());
   });
@@ -82,7 +82,7 @@ void Dynamics::directional(double* dot) {
   std::copy_n(seed(Field::slaveForce), c.load.size(), c.load.begin());
   std::copy_n(seed(Field::slaveMoment), c.moment.size(), c.moment.begin());
   if (ports.anyOfSlaves())
-    ports.spread(seed(Field::portForce), seed(Field::portMoment), c.load.data(), c.moment.data());
+    ports.distributeLoads(seed(Field::portForce), seed(Field::portMoment), c.load.data(), c.moment.data());
   std::fill(c.node.begin(), c.node.end(), 0.0);
   std::fill(c.nodeMoment.begin(), c.nodeMoment.end(), 0.0);
   if (has(Field::nodeForce)) {
@@ -96,7 +96,7 @@ void Dynamics::directional(double* dot) {
       if (!dx) return;
       if (model.finite()) return place(group, range, {c.zero.data(), shape.frame}, dx, c.xs.data());
       std::fill(c.t.begin(), c.t.end(), 0.0);
-      follow(group, range, shape, dx, c.t.data(), c.xs.data(), c.otherTurn.data());
+      mapMotion(group, range, shape, dx, c.t.data(), c.xs.data(), c.otherTurn.data());
     });
     if (has(Field::slavePosition)) std::copy(c.xs.begin(), c.xs.end(), seed(Field::slavePosition));
   }
@@ -104,10 +104,10 @@ void Dynamics::directional(double* dot) {
     const double *vl = velocityFor(Field::lagged), *wl = spinFor(Field::lagged);
     placeSlaves(xs_.data(), true);
     eachSprung([&](const TieGroup& group, SegmentRange range, TieGeometry shape, std::size_t) {
-      follow(group, range, shape, vl, wl, vs_.data(), ws_.data());
+      mapMotion(group, range, shape, vl, wl, vs_.data(), ws_.data());
     });
     eachGroup([&](const TieGroup& group, SegmentRange range, TieGeometry shape, std::size_t) {
-      follow(group, range, shape, du, dturn, c.us.data(), c.turns.data());
+      mapMotion(group, range, shape, du, dturn, c.us.data(), c.turns.data());
       if (shapeChange) followChange(group, shape, shapeChange, vl, c.us.data(), c.turns.data());
     });
     const auto changeOf = [&](const SpringEnd& end) {
@@ -134,7 +134,7 @@ void Dynamics::directional(double* dot) {
 
   // T^T f_s
   const auto spread = [&](const double* force, const double* moment, const double* value, const double* valueMoment) {
-    distributeLoads(force, moment, c.f.data(), c.t.data());
+    distributeAll(force, moment, c.f.data(), c.t.data());
     if (shapeChange)
       eachGroup([&](const TieGroup& group, SegmentRange, TieGeometry shape, std::size_t) {
         distributeChange(group, shape, shapeChange, value, valueMoment, c.f.data());
@@ -178,7 +178,7 @@ void Dynamics::directional(double* dot) {
   // Outputs
   double *vs = seed(Field::slaveVelocity), *ws = seed(Field::slaveSpin);
   eachGroup([&](const TieGroup& group, SegmentRange range, TieGeometry shape, std::size_t) {
-    follow(group, range, shape, du, dturn, vs, ws);
+    mapMotion(group, range, shape, du, dturn, vs, ws);
     if (shapeChange) followChange(group, shape, shapeChange, v, vs, ws);
   });
   const bool full = model.settings.reaction != Reaction::loads, split = model.settings.reaction == Reaction::split;
@@ -206,7 +206,7 @@ void Dynamics::directional(double* dot) {
     if (!model.springs.empty())
       ports.gather(c.node.data(), c.nodeMoment.data(), seed(Field::portReaction), seed(Field::portReactionMoment));
   }
-  if (ports.anyOfSlaves()) ports.mean(vs, ws, seed(Field::portMeanVelocity), seed(Field::portMeanSpin));
+  if (ports.anyOfSlaves()) ports.mapMotion(vs, ws, seed(Field::portMeanVelocity), seed(Field::portMeanSpin));
   if (has(Field::energy)) {
     double kinetic = 0;
     for (int s = 0; s < model.slaves(); ++s) kinetic += mass[s] * at(field(Field::slaveVelocity), s).dot(at(vs, s));

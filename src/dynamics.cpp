@@ -216,7 +216,7 @@ void Dynamics::placeSlaves(double* xs, bool sprungOnly) {
   const auto body = [&](const TieGroup& group, SegmentRange range, TieGeometry shape, std::size_t) {
     if (model.finite()) return place(group, range, shape, x, xs);
     // x_s = X_s + T (x - X): the start position, then the displacement on top.
-    follow(group, range, shape, displacement_.data(), field(Field::angle), vs_.data(), ws_.data());
+    mapMotion(group, range, shape, displacement_.data(), field(Field::angle), vs_.data(), ws_.data());
     place(group, range, shape, model.nodePosition.data(), xs);
     for (int k = 3 * (group.firstSlave + group.begin[range.first]);
          k < 3 * (group.firstSlave + group.begin[range.last]); ++k)
@@ -296,12 +296,12 @@ void Dynamics::gatherLoads() {
   if (has(Field::position)) placeSlaves(xs_.data(), true);
   if (ports.anyOfSlaves()) {
     ports.shape(xs_.data(), [&](int k) { return quaternion(k); });
-    ports.spread(field(Field::portForce), field(Field::portMoment), load_.data(), moment_.data());
+    ports.distributeLoads(field(Field::portForce), field(Field::portMoment), load_.data(), moment_.data());
   }
   if (model.springs.empty()) return;
   const double *v = velocityFor(Field::lagged), *w = spinFor(Field::lagged);
   eachSprung([&](const TieGroup& group, SegmentRange range, TieGeometry shape, std::size_t) {
-    follow(group, range, shape, v, w, vs_.data(), ws_.data());
+    mapMotion(group, range, shape, v, w, vs_.data(), ws_.data());
   });
   double rate2 = 0;
   for (const Spring& spring : model.springs) {
@@ -332,10 +332,12 @@ void Dynamics::findTurnRate(const double* v, const double* w) {
   turnRate_ = std::sqrt(rate2);
 }
 
-void Dynamics::distributeLoads(const double* force, const double* moment, double* f, double* t) {
+void Dynamics::distributeAll(const double* force, const double* moment, double* f, double* t) {
   for (std::size_t g = 0; g < model.groups.size(); ++g) {
     const TieGroup& group = model.groups[g];
-    const auto part = [&](int first, int last) { distribute(group, {first, last}, geometry(g), force, moment, f, t); };
+    const auto part = [&](int first, int last) {
+      distributeLoads(group, {first, last}, geometry(g), force, moment, f, t);
+    };
     if (!workers_) {
       part(0, group.segments());
       continue;
@@ -354,13 +356,13 @@ void Dynamics::evaluateReactions() {
   eachBlock(reactions.count + layout[Field::reactionMoment].count, [&](std::size_t first, std::size_t last) {
     std::fill(data + reactions.offset + first, data + reactions.offset + last, 0.0);
   });
-  distributeLoads(slaveLoad_, slaveMoment_, field(Field::reactionForce), field(Field::reactionMoment));
+  distributeAll(slaveLoad_, slaveMoment_, field(Field::reactionForce), field(Field::reactionMoment));
 }
 
 // a_s = T q'' + b into as_, zs_.
 void Dynamics::slaveAccelerations(const double* a, const double* z, const double* v, const double* w) {
   eachPart([&](const TieGroup& group, SegmentRange range, TieGeometry shape, std::size_t) {
-    follow(group, range, shape, a, z, as_.data(), zs_.data());
+    mapMotion(group, range, shape, a, z, as_.data(), zs_.data());
     if (bias_) addBias(group, range, shape, v, w, as_.data(), zs_.data());
   });
 }
@@ -396,7 +398,7 @@ void Dynamics::evaluate() {
     std::fill(stepSpin_.begin() + 3 * first, stepSpin_.end(), 0.0);
     slaveAccelerations(step_.data(), stepSpin_.data(), velocityFor(Field::predicted), spinFor(Field::predicted));
     inertialLoads();
-    distributeLoads(as_.data(), zs_.data(), right_.data(), rightMoment_.data());
+    distributeAll(as_.data(), zs_.data(), right_.data(), rightMoment_.data());
   }
   for (int i = 3 * first; i < 3 * last; ++i) right_[i] += loadOnNodes_[i];
   for (int i = 3 * first; i < 3 * turning; ++i) rightMoment_[i] += momentOnNodes_[i];
@@ -480,7 +482,7 @@ void Dynamics::drift(double h, double ahead) {
   if (!model.oriented.empty()) {
     // Only rotation couplings are tracked here, whose spin does not depend on the geometry.
     eachSprung([&](const TieGroup& group, SegmentRange range, TieGeometry shape, std::size_t) {
-      follow(group, range, shape, v, w, vs_.data(), ws_.data());
+      mapMotion(group, range, shape, v, w, vs_.data(), ws_.data());
     });
     for (std::size_t k = 0; k < model.oriented.size(); ++k) {
       const SpringEnd& end = model.oriented[k];
@@ -533,7 +535,7 @@ void Dynamics::rates(double* rate) {
   if (offsetsTurn_ || !model.oriented.empty())
     eachGroup([&](const TieGroup& group, SegmentRange range, TieGeometry shape, std::size_t) {
       if (group.coupling != Coupling::rotation) return;
-      follow(group, range, shape, v, w, vs_.data(), ws_.data());
+      mapMotion(group, range, shape, v, w, vs_.data(), ws_.data());
       if (!offsetsTurn_) return;
       for (int s = group.firstSlave; s < group.firstSlave + group.slaves(); ++s)
         at(of(Field::offset), s) = at(ws_.data(), s).cross(at(shape.offset, s));
@@ -578,7 +580,7 @@ void Dynamics::updateOutputs() {
   const double *a = field(Field::acceleration), *z = field(Field::angularAcceleration);
   double *f = field(Field::reactionForce), *t = field(Field::reactionMoment);
   eachPart([&](const TieGroup& group, SegmentRange range, TieGeometry shape, std::size_t) {
-    follow(group, range, shape, v, w, field(Field::slaveVelocity), field(Field::slaveSpin));
+    mapMotion(group, range, shape, v, w, field(Field::slaveVelocity), field(Field::slaveSpin));
   });
   const bool consistent = model.settings.inertia == Inertia::consistent;
   const bool inertial = consistent && model.settings.reaction != Reaction::loads;
@@ -587,11 +589,11 @@ void Dynamics::updateOutputs() {
   if (model.settings.reaction != Reaction::loads) {
     std::fill_n(f, layout[Field::reactionForce].count, 0.0);
     std::fill_n(t, layout[Field::reactionMoment].count, 0.0);
-    distributeLoads(slaveLoad_, slaveMoment_, f, t);
+    distributeAll(slaveLoad_, slaveMoment_, f, t);
     const bool split = model.settings.reaction == Reaction::split;
     if (inertial) {
       inertialLoads();
-      distributeLoads(as_.data(), zs_.data(), f, t);
+      distributeAll(as_.data(), zs_.data(), f, t);
     }
     // full, lumped: - D a. split: + D a.
     if (!consistent || split) {
@@ -609,8 +611,8 @@ void Dynamics::updateOutputs() {
     if (!model.springs.empty()) ports.gather(nodeLoad_.data(), nodeMoment_.data(), force, moment);
   }
   if (ports.anyOfSlaves())
-    ports.mean(field(Field::slaveVelocity), field(Field::slaveSpin), field(Field::portMeanVelocity),
-               field(Field::portMeanSpin));
+    ports.mapMotion(field(Field::slaveVelocity), field(Field::slaveSpin), field(Field::portMeanVelocity),
+                    field(Field::portMeanSpin));
   if (has(Field::portPosition)) ports.places(xs_.data(), field(Field::portPosition));
   if (has(Field::energy)) {
     const double* work = field(Field::work);
@@ -640,7 +642,7 @@ void Dynamics::updateOutputs() {
 double Dynamics::kineticEnergy() {
   const double *v = field(Field::velocity), *w = field(Field::spin);
   eachGroup([&](const TieGroup& group, SegmentRange range, TieGeometry shape, std::size_t) {
-    follow(group, range, shape, v, w, vs_.data(), ws_.data());
+    mapMotion(group, range, shape, v, w, vs_.data(), ws_.data());
   });
   double twice = 0;
   for (int i = model.freeBegin(); i < model.freeEnd(); ++i) twice += model.nodeMass[i] * at(v, i).squaredNorm();
@@ -659,7 +661,7 @@ Dynamics::Power Dynamics::power() {
   for (int i = model.freeBegin(); i < model.rotating(); ++i)
     p.external += at(field(Field::nodeMoment), i).dot(at(w, i));
   eachGroup([&](const TieGroup& group, SegmentRange range, TieGeometry shape, std::size_t) {
-    follow(group, range, shape, v, w, vs_.data(), ws_.data());
+    mapMotion(group, range, shape, v, w, vs_.data(), ws_.data());
   });
   for (int s = 0; s < model.slaves(); ++s)
     p.external += (at(field(Field::slaveForce), s) + field(Field::slaveMass)[s] * g).dot(at(vs_.data(), s));
@@ -680,8 +682,8 @@ Dynamics::Power Dynamics::power() {
       });
   }
   inertialLoads();
-  distributeLoads(as_.data(), zs_.data(), right_.data(), rightMoment_.data());
-  distributeLoads(slaveLoad_, slaveMoment_, right_.data(), rightMoment_.data());
+  distributeAll(as_.data(), zs_.data(), right_.data(), rightMoment_.data());
+  distributeAll(slaveLoad_, slaveMoment_, right_.data(), rightMoment_.data());
   for (int i = 0; i < model.nodes(); ++i) {
     if (i >= model.freeBegin() && i < model.freeEnd()) continue;
     p.external -= (at(right_.data(), i) + at(nodeLoad_.data(), i)).dot(at(v, i));
@@ -697,7 +699,7 @@ void Dynamics::springOperator(const double* u, const double* turn, double* f, do
   std::fill(tangentMoment_.begin(), tangentMoment_.end(), 0.0);
   placeSlaves(xs_.data(), true);
   eachSprung([&](const TieGroup& group, SegmentRange range, TieGeometry shape, std::size_t) {
-    follow(group, range, shape, u, turn, vs_.data(), ws_.data());
+    mapMotion(group, range, shape, u, turn, vs_.data(), ws_.data());
   });
   for (const Spring& spring : model.springs) {
     const SpringLoad l =
@@ -706,7 +708,7 @@ void Dynamics::springOperator(const double* u, const double* turn, double* f, do
     addTo(spring.b, -l.fb, -l.tb, f, t, tangent_.data(), tangentMoment_.data());
   }
   eachSprung([&](const TieGroup& group, SegmentRange range, TieGeometry shape, std::size_t) {
-    distribute(group, range, shape, tangent_.data(), tangentMoment_.data(), f, t);
+    distributeLoads(group, range, shape, tangent_.data(), tangentMoment_.data(), f, t);
   });
 }
 

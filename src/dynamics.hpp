@@ -108,7 +108,7 @@ class Dynamics {
   void gatherLoads();
   void addTo(const SpringEnd& end, const Vec3& force, const Vec3& moment, double* f, double* t, double* fs,
              double* ms) const;
-  void distributeLoads(const double* force, const double* moment, double* f, double* t);
+  void distributeAll(const double* force, const double* moment, double* f, double* t);
   void slaveAccelerations(const double* a, const double* z, const double* v, const double* w);
   void inertialLoads();
   void findTurnRate(const double* v, const double* w);

@@ -194,7 +194,7 @@ std::string Ports::collapsed() const {
   return {};
 }
 
-void Ports::spread(const double* force, const double* moment, double* fs, double* ms) const {
+void Ports::distributeLoads(const double* force, const double* moment, double* fs, double* ms) const {
   for (std::size_t k = 0; k < shapes_.size(); ++k) {
     const Port& port = slavePort(k);
     const Shape& s = shapes_[k];
@@ -222,7 +222,7 @@ Ports::Twist Ports::meanMotion(std::size_t k, const double* vs, const double* ws
   return {v / static_cast<double>(port.member.size()) + w.cross(s.lever), w};
 }
 
-void Ports::mean(const double* vs, const double* ws, double* velocity, double* spin) const {
+void Ports::mapMotion(const double* vs, const double* ws, double* velocity, double* spin) const {
   for (std::size_t k = 0; k < shapes_.size(); ++k) {
     const Twist twist = meanMotion(k, vs, ws);
     at(velocity, k) = twist.velocity;

@@ -48,8 +48,9 @@ class Ports {
   // number k as SpringEnd::orientation counts.
   template <class Quaternion> void shape(const double* xs, Quaternion quaternion);
   std::string collapsed() const;  // name of a port whose slaves have come to lie on a line; empty: none
-  void spread(const double* force, const double* moment, double* fs, double* ms) const;  // added to the slaves' loads
-  void mean(const double* vs, const double* ws, double* velocity, double* spin) const;
+  void distributeLoads(const double* force, const double* moment, double* fs,
+                       double* ms) const;  // added to the slaves' loads
+  void mapMotion(const double* vs, const double* ws, double* velocity, double* spin) const;
   double power(const double* vs, const double* ws) const;  // of the loads that are inputs, W
   // Of the reference points, 3 per port: those of driven nodes, then those of slaves at positions `xs`.
   void places(const double* xs, double* x) const;

@@ -26,14 +26,14 @@ bool useBaselineKernels(bool baseline) {
   return kernels == &baselineKernels;
 }
 
-void follow(const TieGroup& group, SegmentRange range, TieGeometry geometry, const double* u, const double* turn,
-            double* us, double* turns) {
-  kernels->follow(view(group, range), geometry, u, turn, us, turns);
+void mapMotion(const TieGroup& group, SegmentRange range, TieGeometry geometry, const double* u, const double* turn,
+               double* us, double* turns) {
+  kernels->mapMotion(view(group, range), geometry, u, turn, us, turns);
 }
 
-void distribute(const TieGroup& group, SegmentRange range, TieGeometry geometry, const double* force,
-                const double* moment, double* f, double* t) {
-  kernels->distribute(view(group, range), geometry, force, moment, f, t);
+void distributeLoads(const TieGroup& group, SegmentRange range, TieGeometry geometry, const double* force,
+                     const double* moment, double* f, double* t) {
+  kernels->distributeLoads(view(group, range), geometry, force, moment, f, t);
 }
 
 void addBias(const TieGroup& group, SegmentRange range, TieGeometry geometry, const double* velocity,

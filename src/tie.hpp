@@ -1,4 +1,7 @@
-// The tie itself: how slaves follow their masters (T) and how loads go back (T^T), theory 2 and 3.
+// The tie itself: the map of the masters' motion to the slaves (T), theory 2, and the distribution of the slaves' loads
+// to the masters (T^T), theory 3. In the terms of coupling libraries the first is a consistent map (a rigid motion is
+// passed on exactly) and the second, its transpose, a conservative one (force, moment and power are kept). The mean
+// motion of a segment is what finite element codes call RBE3 or a distributing coupling, with equal weights.
 //
 // Every kernel works on the segments [first, last) of one group. Arrays are indexed as in Model: masters by node (3
 // doubles each), slaves by slave (3 doubles each); spin and moment arrays hold the leading rotating nodes and turning
@@ -18,13 +21,13 @@ bool useBaselineKernels(bool baseline);
 
 // u_s = T u. `u`, `turn`: 3 per node / rotating node (velocity and spin, or acceleration, or displacement and small
 // rotation); writes `us` (3 per slave) and `turns` (3 per turning slave). [theory (2.2), (2.6)]
-void follow(const TieGroup& group, SegmentRange range, TieGeometry geometry, const double* u, const double* turn,
-            double* us, double* turns);
+void mapMotion(const TieGroup& group, SegmentRange range, TieGeometry geometry, const double* u, const double* turn,
+               double* us, double* turns);
 
-// (f, t) += T^T (F, M): the transpose of `follow`. `force` 3 per slave, `moment` 3 per turning slave (N, N m), added
+// (f, t) += T^T (F, M): the transpose of `mapMotion`. `force` 3 per slave, `moment` 3 per turning slave (N, N m), added
 // to `f` 3 per node and `t` 3 per rotating node. [theory (3.2), (3.3)]
-void distribute(const TieGroup& group, SegmentRange range, TieGeometry geometry, const double* force,
-                const double* moment, double* f, double* t);
+void distributeLoads(const TieGroup& group, SegmentRange range, TieGeometry geometry, const double* force,
+                     const double* moment, double* f, double* t);
 
 // (a_s, z_s) += b, the part of the slaves' acceleration that is quadratic in velocities (theory 2).
 void addBias(const TieGroup& group, SegmentRange range, TieGeometry geometry, const double* velocity,

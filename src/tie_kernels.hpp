@@ -6,8 +6,8 @@
 namespace tiefmu {
 
 struct TieKernels {
-  void (*follow)(const TieView&, TieGeometry, const double* u, const double* turn, double* us, double* turns);
-  void (*distribute)(const TieView&, TieGeometry, const double* force, const double* moment, double* f, double* t);
+  void (*mapMotion)(const TieView&, TieGeometry, const double* u, const double* turn, double* us, double* turns);
+  void (*distributeLoads)(const TieView&, TieGeometry, const double* force, const double* moment, double* f, double* t);
   void (*addBias)(const TieView&, TieGeometry, const double* velocity, const double* spin, double* as, double* zs);
   void (*place)(const TieView&, TieGeometry, const double* position, double* xs);
   bool (*updateFrames)(const TieView&, const double* position, SegmentFrame* frame);

@@ -151,7 +151,7 @@ template <class Body> TIEFMU_INLINE void byCorners(const TieView& tie, Body body
     body(std::integral_constant<int, 3>{});
 }
 
-template <int N> TIEFMU_INLINE void followTranslation(const TieView& tie, const double* u, double* us) {
+template <int N> TIEFMU_INLINE void mapTranslation(const TieView& tie, const double* u, double* us) {
   const double* weight = weights<N>(tie);
   eachSegment<N>(tie, [&](int, Corners<N> nodes, std::ptrdiff_t s, std::ptrdiff_t last) TIEFMU_INLINED {
     Pack ui[N];
@@ -165,8 +165,8 @@ template <int N> TIEFMU_INLINE void followTranslation(const TieView& tie, const 
 }
 
 template <int N>
-TIEFMU_INLINE void followRotation(const TieView& tie, const double* offset, const double* u, const double* turn,
-                                  double* us, double* turns) {
+TIEFMU_INLINE void mapRotation(const TieView& tie, const double* offset, const double* u, const double* turn,
+                               double* us, double* turns) {
   const double* weight = weights<N>(tie);
   eachSegment<N>(tie, [&](int, Corners<N> nodes, std::ptrdiff_t s, std::ptrdiff_t last) TIEFMU_INLINED {
     Pack ui[N], wi[N];
@@ -185,8 +185,7 @@ TIEFMU_INLINE void followRotation(const TieView& tie, const double* offset, cons
 }
 
 template <int N>
-TIEFMU_INLINE void followMeanMotion(const TieView& tie, TieGeometry geometry, const double* u, double* us,
-                                    double* turns) {
+TIEFMU_INLINE void mapMeanMotion(const TieView& tie, TieGeometry geometry, const double* u, double* us, double* turns) {
   eachRun(tie, [&](int first, int last) TIEFMU_INLINED {
     Pack centre[together], w[together];
     for (int e = first; e < last; ++e) {
@@ -211,15 +210,16 @@ TIEFMU_INLINE void followMeanMotion(const TieView& tie, TieGeometry geometry, co
   });
 }
 
-void follow(const TieView& tie, TieGeometry geometry, const double* u, const double* turn, double* us, double* turns) {
+void mapMotion(const TieView& tie, TieGeometry geometry, const double* u, const double* turn, double* us,
+               double* turns) {
   byCorners(tie, [&](auto n) TIEFMU_INLINED {
     constexpr int N = decltype(n)::value;
     if (tie.coupling == Coupling::translation)
-      followTranslation<N>(tie, u, us);
+      mapTranslation<N>(tie, u, us);
     else if (tie.coupling == Coupling::rotation)
-      followRotation<N>(tie, geometry.offset, u, turn, us, turns);
+      mapRotation<N>(tie, geometry.offset, u, turn, us, turns);
     else
-      followMeanMotion<N>(tie, geometry, u, us, turns);
+      mapMeanMotion<N>(tie, geometry, u, us, turns);
   });
 }
 
@@ -298,8 +298,8 @@ TIEFMU_INLINE void distributeMeanMotion(const TieView& tie, TieGeometry geometry
   });
 }
 
-void distribute(const TieView& tie, TieGeometry geometry, const double* force, const double* moment, double* f,
-                double* t) {
+void distributeLoads(const TieView& tie, TieGeometry geometry, const double* force, const double* moment, double* f,
+                     double* t) {
   byCorners(tie, [&](auto n) TIEFMU_INLINED {
     constexpr int N = decltype(n)::value;
     if (tie.coupling == Coupling::translation)
@@ -566,7 +566,7 @@ bool within(std::size_t count, const double* value, double limit) {
 
 }  // namespace
 
-const TieKernels TIEFMU_KERNELS = {follow,       distribute,    addBias,  place,     updateFrames, turnOffsets,
-                                   moveSegments, rotateOffsets, meanSpin, addScaled, accelerate,   within};
+const TieKernels TIEFMU_KERNELS = {mapMotion,    distributeLoads, addBias,  place,     updateFrames, turnOffsets,
+                                   moveSegments, rotateOffsets,   meanSpin, addScaled, accelerate,   within};
 
 }  // namespace tiefmu

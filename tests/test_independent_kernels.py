@@ -53,7 +53,7 @@ def close(value, expected, tolerance=1e-12):
 
 @couplings
 @corners
-def test_follow_and_distribute(coupling, n):
+def test_motion_mapping_and_load_distribution(coupling, n):
     case = Case(coupling, n)
     q, loads = np.hstack([case.v, case.w]), np.zeros((len(case.position), 6))
     twist = []
@@ -61,8 +61,8 @@ def test_follow_and_distribute(coupling, n):
         t, nodes = case.map(s)
         twist.append(t @ q[nodes].ravel())
         loads[nodes] += (t.T @ np.concatenate([case.force[s], case.moment[s]])).reshape(-1, 6)
-    close(np.hstack(case.group.follow(case.v, case.w)), np.array(twist))
-    close(np.hstack(case.group.distribute(case.force, case.moment)), loads)
+    close(np.hstack(case.group.map_motion(case.v, case.w)), np.array(twist))
+    close(np.hstack(case.group.distribute_loads(case.force, case.moment)), loads)
 
 
 @couplings
@@ -70,7 +70,7 @@ def test_follow_and_distribute(coupling, n):
 @pytest.mark.parametrize("seed", range(10))
 def test_one_is_the_transpose_of_the_other(coupling, n, seed):
     case = Case(coupling, n, seed)
-    (vs, ws), (f, t) = case.group.follow(case.v, case.w), case.group.distribute(case.force, case.moment)
+    (vs, ws), (f, t) = case.group.map_motion(case.v, case.w), case.group.distribute_loads(case.force, case.moment)
     taken, given = case.force * vs + case.moment * ws, f * case.v + t * case.w
     assert abs(taken.sum() - given.sum()) < 1e-13 * np.abs(taken).sum()
 
@@ -97,11 +97,11 @@ def test_bias(coupling, n):
 def test_bias_is_the_rate_of_the_map(coupling, n):
     """d/dt (T q') at q'' = 0 by central differences, the slave's offset turning with it."""
     case, h = Case(coupling, n), 1e-6
-    ws = case.group.follow(case.v, case.w)[1]
+    ws = case.group.map_motion(case.v, case.w)[1]
 
     def twist(t):
         case.group.set_geometry(case.position + t * case.v, case.offset + t * np.cross(ws, case.offset))
-        return np.hstack(case.group.follow(case.v, case.w))
+        return np.hstack(case.group.map_motion(case.v, case.w))
 
     bias = np.hstack(case.group.bias(case.v, case.w))
     close(bias, (twist(h) - twist(-h)) / (2 * h), 1e-7)

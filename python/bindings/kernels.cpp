@@ -212,22 +212,22 @@ void bindKernels(nb::module_& parent) {
           },
           "positions"_a, "offset"_a, "Node positions (nodes, 3) and offsets d (slaves, 3), m.")
       .def(
-          "follow",
+          "map_motion",
           [](const Group& g, Doubles v, Doubles w) {
             wants(v, 3 * g.nodes, "v");
             wants(w, 3 * g.nodes, "w");
             std::vector<double> vs(3 * g.slaves), ws(3 * g.slaves);
-            follow(g.tie, g.all(), g.geometry(), v.data(), w.data(), vs.data(), ws.data());
+            mapMotion(g.tie, g.all(), g.geometry(), v.data(), w.data(), vs.data(), ws.data());
             return std::pair{array(std::move(vs), {g.slaves, 3}), array(std::move(ws), {g.slaves, 3})};
           },
           "v"_a, "w"_a, "(v_s, w_s) = T (v, w); (nodes, 3) to (slaves, 3). w_s is zero for 'translation'.")
       .def(
-          "distribute",
+          "distribute_loads",
           [](const Group& g, Doubles force, Doubles moment) {
             wants(force, 3 * g.slaves, "force");
             wants(moment, 3 * g.slaves, "moment");
             std::vector<double> f(3 * g.nodes), t(3 * g.nodes);
-            distribute(g.tie, g.all(), g.geometry(), force.data(), moment.data(), f.data(), t.data());
+            distributeLoads(g.tie, g.all(), g.geometry(), force.data(), moment.data(), f.data(), t.data());
             return std::pair{array(std::move(f), {g.nodes, 3}), array(std::move(t), {g.nodes, 3})};
           },
           "force"_a, "moment"_a, "(f, t) = T^T (F, M); (slaves, 3) to (nodes, 3).")
