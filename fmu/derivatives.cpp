@@ -42,7 +42,7 @@ void Instance::directionalDerivative(const fmi2ValueReference unknown[], std::si
     if (!std::isfinite(seed[k])) refuseValue(known[k], seed + k);
     scratch[place] += seed[k];
   }
-  simulation.directional(scratch.data());
+  simulation.directionalDerivative(scratch.data());
   takeScratch(unknown, unknowns, change);
 }
 

@@ -80,9 +80,9 @@ class Dynamics {
   // M^-1 of the free nodes, on node arrays: loads f, t to accelerations a, z, which hold a guess on entry.
   void solveInertia(const double* f, const double* t, double* a, double* z);
 
-  // Change of every output, in `dot` laid out like `data`, with the inputs' change given there. Outputs must be up to
-  // date. Allocates at the first call.
-  void directional(double* dot);
+  // Of every output, in `derivative` laid out like `data`, along the change of the inputs given there. Outputs must be
+  // up to date. Allocates at the first call.
+  void directionalDerivative(double* derivative);
 
   // body(first, last) over blocks of [0, count), shared among threads.
   template <class Body> void eachBlock(std::size_t count, Body body) const;
@@ -90,9 +90,10 @@ class Dynamics {
   std::int64_t evaluations = 0;
 
  private:
-  struct Change;
-  void changeAccelerations(Change& change, const double* da, const double* dz, const double* a, const double* v,
-                           const double* w, const double* du, const double* dturn, const double* dx);
+  struct Derivative;
+  void differentiateAccelerations(Derivative& change, const double* da, const double* dz, const double* a,
+                                  const double* v, const double* w, const double* du, const double* dturn,
+                                  const double* dx);
   struct Sprung {
     int group;
     SegmentRange range;
@@ -138,8 +139,8 @@ class Dynamics {
   std::atomic<bool> sound_{true};  // no kernel has met a collapsed segment since the last look
   bool gravity_ = false, offsetsTurn_ = false, bias_ = false, knownAccelerations_ = false, drivenMove_ = true;
   std::unique_ptr<ConsistentInertia> inertia_;
-  std::unique_ptr<Workers> workers_;  // none where one thread does it all
-  std::shared_ptr<Change> change_;    // scratch of `directional`, made at its first call
+  std::unique_ptr<Workers> workers_;        // none where one thread does it all
+  std::shared_ptr<Derivative> derivative_;  // scratch of `directionalDerivative`, made at its first call
 };
 
 template <class Body> void Dynamics::eachGroup(Body body) const {

@@ -146,8 +146,8 @@ void Ports::advance(const InputCurve& inputs, double tau, double h) {
   }
 }
 
-void Ports::moveChange(double* dot) const {
-  const auto change = [&](Field f) { return dot + layout_[f].offset; };
+void Ports::moveDerivative(double* derivative) const {
+  const auto change = [&](Field f) { return derivative + layout_[f].offset; };
   for (std::size_t p = 0; p < driven_; ++p) {
     const Port& port = model_.ports[p];
     const Mat3 turned = rotation(p);

@@ -39,7 +39,7 @@ class Ports {
   // Before a drift over [tau, tau + h] of the inputs' curve: the velocities and spins that carry the nodes to its end.
   void carry(const InputCurve& inputs, double tau, double h);
   void advance(const InputCurve& inputs, double tau, double h);  // after it: pose, positions and velocities at the end
-  void moveChange(double* dot) const;  // changes of the nodes' motion with the inputs', laid out like `data`
+  void moveDerivative(double* derivative) const;  // of the nodes' motion along the inputs', laid out like `data`
   // Resultants of the nodes' loads (f 3 per node, t 3 per rotating node), added to force, moment (3 per port).
   void gather(const double* f, const double* t, double* force, double* moment) const;
 

@@ -468,9 +468,9 @@ void Simulation::updateOutputs() {
   s.outputsOld = false;
 }
 
-void Simulation::directional(double* change) {
+void Simulation::directionalDerivative(double* derivative) {
   updateOutputs();
-  impl_->dynamics.directional(change);
+  impl_->dynamics.directionalDerivative(derivative);
 }
 
 void Simulation::save(State& state) const {

@@ -72,9 +72,9 @@ class Simulation {
   void save(State& state) const;
   void restore(const State& state);
 
-  // Directional derivative at the present state: `change` is laid out like `data`; on entry it holds a change of the
-  // inputs and zeros elsewhere, on return that of every output. Free nodes' motion is a state and does not change.
-  void directional(double* change);
+  // Directional derivative at the present state: `derivative` is laid out like `data`; on entry it holds a change of
+  // the inputs and zeros elsewhere, on return that of every output. Free nodes' motion is a state and does not change.
+  void directionalDerivative(double* derivative);
 
   // Forces evaluated so far (a machine-independent cost).
   std::int64_t evaluations() const;

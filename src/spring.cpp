@@ -59,8 +59,8 @@ SpringLoad springTangent(const Spring& spring, const EndMotion& a, const EndMoti
   return load;
 }
 
-SpringLoad springChange(const Spring& spring, const EndMotion& a, const EndMotion& b, const EndMotion& da,
-                        const EndMotion& db) {
+SpringLoad springLoadDerivative(const Spring& spring, const EndMotion& a, const EndMotion& b, const EndMotion& da,
+                                const EndMotion& db) {
   SpringLoad change;
   const Vec3 line = a.x - b.x, dLine = da.x - db.x;
   if (spring.kind == SpringKind::axial) {

@@ -30,7 +30,7 @@ SpringLoad springTangent(const Spring& spring, const EndMotion& a, const EndMoti
 
 // Change of springLoad when the ends' x, v and w change by da and db (their rotations stay): exact, to first order.
 // `energy` is the change of the stored energy.
-SpringLoad springChange(const Spring& spring, const EndMotion& a, const EndMotion& b, const EndMotion& da,
-                        const EndMotion& db);
+SpringLoad springLoadDerivative(const Spring& spring, const EndMotion& a, const EndMotion& b, const EndMotion& da,
+                                const EndMotion& db);
 
 }  // namespace tiefmu

@@ -69,13 +69,14 @@ void accelerate(std::size_t nodes, const double* load, const double* reaction, c
 // Is every |value| below the limit? NaN is not.
 bool within(std::size_t count, const double* value, double limit);
 
-// Changes with the nodes' positions, which only meanMotion couplings feel (dx: 3 per node, m). Each adds to its result.
-//   followChange: (dT) u    distributeChange: (dT)^T (F, M)    biasChange: db
-void followChange(const TieGroup& group, TieGeometry geometry, const double* dx, const double* u, double* us,
-                  double* turns);
-void distributeChange(const TieGroup& group, TieGeometry geometry, const double* dx, const double* force,
-                      const double* moment, double* f);
-void biasChange(const TieGroup& group, TieGeometry geometry, const double* dx, const double* velocity, double* as,
-                double* zs);
+// Directional derivatives along a change dx of the nodes' positions (3 per node, m), which only meanMotion couplings
+// feel. Each adds to its result.
+//   mapMotionDerivative: (dT) u    distributeLoadsDerivative: (dT)^T (F, M)    biasDerivative: db
+void mapMotionDerivative(const TieGroup& group, TieGeometry geometry, const double* dx, const double* u, double* us,
+                         double* turns);
+void distributeLoadsDerivative(const TieGroup& group, TieGeometry geometry, const double* dx, const double* force,
+                               const double* moment, double* f);
+void biasDerivative(const TieGroup& group, TieGeometry geometry, const double* dx, const double* velocity, double* as,
+                    double* zs);
 
 }  // namespace tiefmu

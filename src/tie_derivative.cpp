@@ -4,14 +4,14 @@ namespace tiefmu {
 namespace {
 
 // One meanMotion segment and how its nodes' positions change.
-struct Changing {
+struct MovingSegment {
   const SegmentFrame& frame;
   const int* node;
   int corners, first, last;  // slaves [first, last)
   Vec3 arm[4], dArm[4];
   Mat3 inverse;
 
-  Changing(const TieGroup& group, TieGeometry geometry, int e, const double* dx)
+  MovingSegment(const TieGroup& group, TieGeometry geometry, int e, const double* dx)
       : frame(geometry.frame[e]),
         node(&group.node[static_cast<std::size_t>(group.corners) * e]),
         corners(group.corners),
@@ -27,7 +27,7 @@ struct Changing {
   }
 
   // (sum 2 (p.q) 1 - q p^T - p q^T) y: change of Ibar for arms p that change by q, times y.
-  Vec3 inertiaChange(const Vec3* p, const Vec3* q, const Vec3& y) const {
+  Vec3 inertiaDerivative(const Vec3* p, const Vec3* q, const Vec3& y) const {
     Vec3 sum(0, 0, 0);
     for (int i = 0; i < corners; ++i) sum += 2 * p[i].dot(q[i]) * y - p[i].dot(y) * q[i] - q[i].dot(y) * p[i];
     return sum;
@@ -38,24 +38,24 @@ struct Changing {
     for (int i = 0; i < corners; ++i) sum += arm[i].cross(at(u, node[i]));
     return inverse * sum;
   }
-  Vec3 spinChange(const double* u) const {
+  Vec3 spinDerivative(const double* u) const {
     Vec3 sum(0, 0, 0);
     for (int i = 0; i < corners; ++i) sum += dArm[i].cross(at(u, node[i]));
-    return inverse * (sum - inertiaChange(arm, dArm, spin(u)));
+    return inverse * (sum - inertiaDerivative(arm, dArm, spin(u)));
   }
 };
 
-template <class Body> void eachChanging(const TieGroup& group, TieGeometry geometry, const double* dx, Body body) {
+template <class Body> void eachMovingSegment(const TieGroup& group, TieGeometry geometry, const double* dx, Body body) {
   if (group.coupling != Coupling::meanMotion) return;
-  for (int e = 0; e < group.segments(); ++e) body(Changing(group, geometry, e, dx));
+  for (int e = 0; e < group.segments(); ++e) body(MovingSegment(group, geometry, e, dx));
 }
 
 }  // namespace
 
-void followChange(const TieGroup& group, TieGeometry geometry, const double* dx, const double* u, double* us,
-                  double* turns) {
-  eachChanging(group, geometry, dx, [&](const Changing& segment) {
-    const Vec3 dw = segment.spinChange(u);
+void mapMotionDerivative(const TieGroup& group, TieGeometry geometry, const double* dx, const double* u, double* us,
+                         double* turns) {
+  eachMovingSegment(group, geometry, dx, [&](const MovingSegment& segment) {
+    const Vec3 dw = segment.spinDerivative(u);
     for (int s = segment.first; s < segment.last; ++s) {
       at(us, s) += dw.cross(at(geometry.offset, s));
       at(turns, s) += dw;
@@ -63,31 +63,32 @@ void followChange(const TieGroup& group, TieGeometry geometry, const double* dx,
   });
 }
 
-void distributeChange(const TieGroup& group, TieGeometry geometry, const double* dx, const double* force,
-                      const double* moment, double* f) {
-  eachChanging(group, geometry, dx, [&](const Changing& segment) {
+void distributeLoadsDerivative(const TieGroup& group, TieGeometry geometry, const double* dx, const double* force,
+                               const double* moment, double* f) {
+  eachMovingSegment(group, geometry, dx, [&](const MovingSegment& segment) {
     Vec3 sum(0, 0, 0);
     for (int s = segment.first; s < segment.last; ++s)
       sum += at(moment, s) + Vec3(at(geometry.offset, s)).cross(at(force, s));
     // f_i = F/n + A x r_i, Ibar A = sum
-    const Vec3 A = segment.inverse * sum, dA = -segment.inverse * segment.inertiaChange(segment.arm, segment.dArm, A);
+    const Vec3 A = segment.inverse * sum,
+               dA = -segment.inverse * segment.inertiaDerivative(segment.arm, segment.dArm, A);
     for (int i = 0; i < segment.corners; ++i)
       at(f, segment.node[i]) += dA.cross(segment.arm[i]) + A.cross(segment.dArm[i]);
   });
 }
 
-void biasChange(const TieGroup& group, TieGeometry geometry, const double* dx, const double* velocity, double* as,
-                double* zs) {
-  eachChanging(group, geometry, dx, [&](const Changing& segment) {
-    const Vec3 w = segment.spin(velocity), dw = segment.spinChange(velocity);
+void biasDerivative(const TieGroup& group, TieGeometry geometry, const double* dx, const double* velocity, double* as,
+                    double* zs) {
+  eachMovingSegment(group, geometry, dx, [&](const MovingSegment& segment) {
+    const Vec3 w = segment.spin(velocity), dw = segment.spinDerivative(velocity);
     Vec3 centre(0, 0, 0), rate[4];
     for (int i = 0; i < segment.corners; ++i) centre += at(velocity, segment.node[i]) / segment.corners;
     for (int i = 0; i < segment.corners; ++i) rate[i] = at(velocity, segment.node[i]) - centre;
     // Ibar z = -Ibar' w, both sides changed
-    const Vec3 z = -segment.inverse * segment.inertiaChange(segment.arm, rate, w);
-    const Vec3 dz = -segment.inverse *
-                    (segment.inertiaChange(segment.dArm, rate, w) + segment.inertiaChange(segment.arm, rate, dw) +
-                     segment.inertiaChange(segment.arm, segment.dArm, z));
+    const Vec3 z = -segment.inverse * segment.inertiaDerivative(segment.arm, rate, w);
+    const Vec3 dz = -segment.inverse * (segment.inertiaDerivative(segment.dArm, rate, w) +
+                                        segment.inertiaDerivative(segment.arm, rate, dw) +
+                                        segment.inertiaDerivative(segment.arm, segment.dArm, z));
     for (int s = segment.first; s < segment.last; ++s) {
       const Vec3 d = at(geometry.offset, s);
       at(as, s) += dz.cross(d) + dw.cross(w.cross(d)) + w.cross(dw.cross(d));

@@ -5,7 +5,7 @@
 
 namespace tiefmu {
 
-struct Dynamics::Change {
+struct Dynamics::Derivative {
   std::vector<double> u, turn;           // nodes: a motion whose free part is zero
   std::vector<double> v, w;              // values to perturb the quadratic bias about
   std::vector<double> xs, us, turns;     // slaves: positions, velocities
@@ -14,7 +14,7 @@ struct Dynamics::Change {
   std::vector<double> as, zs, other, otherTurn;
   std::vector<double> f, t, zero;
 
-  explicit Change(const Model& model) {
+  explicit Derivative(const Model& model) {
     const std::size_t n = 3 * static_cast<std::size_t>(model.nodes()),
                       r = 3 * static_cast<std::size_t>(model.rotating());
     const std::size_t s = 3 * static_cast<std::size_t>(model.slaves()),
@@ -28,12 +28,13 @@ struct Dynamics::Change {
 
 // Accelerations of the slaves change by T dq'' + (dT) q'' + db into change.as, zs. `v`, `w`: of the bias; its change
 // with the driven velocities du, dturn is half the difference between both sides, exact for a quadratic form.
-void Dynamics::changeAccelerations(Change& c, const double* da, const double* dz, const double* a, const double* v,
-                                   const double* w, const double* du, const double* dturn, const double* dx) {
+void Dynamics::differentiateAccelerations(Derivative& c, const double* da, const double* dz, const double* a,
+                                          const double* v, const double* w, const double* du, const double* dturn,
+                                          const double* dx) {
   eachGroup([&](const TieGroup& group, SegmentRange range, TieGeometry shape, std::size_t) {
     if (da) mapMotion(group, range, shape, da, dz, c.as.data(), c.zs.data());
-    if (dx && a) followChange(group, shape, dx, a, c.as.data(), c.zs.data());
-    if (dx && bias_) biasChange(group, shape, dx, v, c.as.data(), c.zs.data());
+    if (dx && a) mapMotionDerivative(group, shape, dx, a, c.as.data(), c.zs.data());
+    if (dx && bias_) biasDerivative(group, shape, dx, v, c.as.data(), c.zs.data());
   });
   if (!bias_) return;
   double largest = 0, size = 0;
@@ -60,10 +61,10 @@ void Dynamics::changeAccelerations(Change& c, const double* da, const double* dz
   }
 }
 
-void Dynamics::directional(double* dot) {
-  if (!change_) change_ = std::make_shared<Change>(model);
-  Change& c = *change_;
-  const auto seed = [&](Field f) { return dot + layout[f].offset; };
+void Dynamics::directionalDerivative(double* derivative) {
+  if (!derivative_) derivative_ = std::make_shared<Derivative>(model);
+  Derivative& c = *derivative_;
+  const auto seed = [&](Field f) { return derivative + layout[f].offset; };
   const int first = 3 * model.freeBegin(), last = 3 * model.freeEnd();
   const int turning = 3 * model.rotating();
   const bool consistent = model.settings.inertia == Inertia::consistent;
@@ -76,7 +77,7 @@ void Dynamics::directional(double* dot) {
   if (has(Field::position) && !drivenMove_) dx = seed(Field::position);
   const double* shapeChange = model.finite() ? dx : nullptr;
 
-  if (ports.anyDriven()) ports.moveChange(dot);
+  if (ports.anyDriven()) ports.moveDerivative(derivative);
 
   // f_s
   std::copy_n(seed(Field::slaveForce), c.load.size(), c.load.begin());
@@ -108,7 +109,7 @@ void Dynamics::directional(double* dot) {
     });
     eachGroup([&](const TieGroup& group, SegmentRange range, TieGeometry shape, std::size_t) {
       mapMotion(group, range, shape, du, dturn, c.us.data(), c.turns.data());
-      if (shapeChange) followChange(group, shape, shapeChange, vl, c.us.data(), c.turns.data());
+      if (shapeChange) mapMotionDerivative(group, shape, shapeChange, vl, c.us.data(), c.turns.data());
     });
     const auto changeOf = [&](const SpringEnd& end) {
       EndMotion m;
@@ -124,8 +125,9 @@ void Dynamics::directional(double* dot) {
       return m;
     };
     for (const Spring& spring : model.springs) {
-      const SpringLoad l = springChange(spring, motion(spring.a, spring, vl, wl), motion(spring.b, spring, vl, wl),
-                                        changeOf(spring.a), changeOf(spring.b));
+      const SpringLoad l =
+          springLoadDerivative(spring, motion(spring.a, spring, vl, wl), motion(spring.b, spring, vl, wl),
+                               changeOf(spring.a), changeOf(spring.b));
       addTo(spring.a, l.fa, l.ta, c.node.data(), c.nodeMoment.data(), c.load.data(), c.moment.data());
       addTo(spring.b, l.fb, l.tb, c.node.data(), c.nodeMoment.data(), c.load.data(), c.moment.data());
       strain += l.energy;
@@ -137,7 +139,7 @@ void Dynamics::directional(double* dot) {
     distributeAll(force, moment, c.f.data(), c.t.data());
     if (shapeChange)
       eachGroup([&](const TieGroup& group, SegmentRange, TieGeometry shape, std::size_t) {
-        distributeChange(group, shape, shapeChange, value, valueMoment, c.f.data());
+        distributeLoadsDerivative(group, shape, shapeChange, value, valueMoment, c.f.data());
       });
   };
   const auto inertial = [&](std::vector<double>& force, std::vector<double>& moment) {
@@ -157,7 +159,7 @@ void Dynamics::directional(double* dot) {
       const double *vp = velocityFor(Field::predicted), *wp = spinFor(Field::predicted);
       slaveAccelerations(a, z, vp, wp);
       inertialLoads();
-      changeAccelerations(c, da, dz, a, vp, wp, du, dturn, shapeChange);
+      differentiateAccelerations(c, da, dz, a, vp, wp, du, dturn, shapeChange);
       inertial(c.as, c.zs);
       const std::vector<double> f = c.f, t = c.t;
       spread(c.as.data(), c.zs.data(), as_.data(), zs_.data());
@@ -179,13 +181,13 @@ void Dynamics::directional(double* dot) {
   double *vs = seed(Field::slaveVelocity), *ws = seed(Field::slaveSpin);
   eachGroup([&](const TieGroup& group, SegmentRange range, TieGeometry shape, std::size_t) {
     mapMotion(group, range, shape, du, dturn, vs, ws);
-    if (shapeChange) followChange(group, shape, shapeChange, v, vs, ws);
+    if (shapeChange) mapMotionDerivative(group, shape, shapeChange, v, vs, ws);
   });
   const bool full = model.settings.reaction != Reaction::loads, split = model.settings.reaction == Reaction::split;
   if ((full && consistent) || has(Field::slaveAcceleration)) {
     std::fill(c.as.begin(), c.as.end(), 0.0);
     std::fill(c.zs.begin(), c.zs.end(), 0.0);
-    changeAccelerations(c, da, dz, a, v, w, du, dturn, shapeChange);
+    differentiateAccelerations(c, da, dz, a, v, w, du, dturn, shapeChange);
     if (has(Field::slaveAcceleration)) std::copy(c.as.begin(), c.as.end(), seed(Field::slaveAcceleration));
     if (full && consistent) {
       slaveAccelerations(a, z, v, w);
