@@ -4,17 +4,17 @@
 #include <cstddef>
 #include <type_traits>
 
-#include "pack.hpp"
+#include "simd.hpp"
 #include "tie_kernels.hpp"
 
 namespace tiefmu {
 namespace {
 
 // Where a stream of slaves is read or written next: the processor's own guesses lose streams that stop and go.
-constexpr std::ptrdiff_t aheadBy = 96;  // doubles
-TIEFMU_INLINE void ahead(const double* p) { __builtin_prefetch(p + aheadBy); }
-TIEFMU_INLINE void aheadToWrite(const double* p) { __builtin_prefetch(p + aheadBy, 1); }
-TIEFMU_INLINE void frameAhead(const SegmentFrame* frame) {
+constexpr std::ptrdiff_t prefetchDistance = 96;  // doubles
+TIEFMU_INLINE void prefetch(const double* p) { __builtin_prefetch(p + prefetchDistance); }
+TIEFMU_INLINE void prefetchToWrite(const double* p) { __builtin_prefetch(p + prefetchDistance, 1); }
+TIEFMU_INLINE void prefetchFrame(const SegmentFrame* frame) {
   const double* p = frame[16].arm;
   __builtin_prefetch(p);
   __builtin_prefetch(p + 8);
@@ -23,10 +23,10 @@ TIEFMU_INLINE void frameAhead(const SegmentFrame* frame) {
 
 template <int N> struct Corners {
   const int* node;
-  TIEFMU_INLINE void gather(const double* field, Pack* to) const {
+  TIEFMU_INLINE void gather(const double* field, SimdVec3* to) const {
     for (int i = 0; i < N; ++i) to[i] = load(field + 3 * static_cast<std::ptrdiff_t>(node[i]));
   }
-  TIEFMU_INLINE void add(const Pack* from, double* field) const {
+  TIEFMU_INLINE void add(const SimdVec3* from, double* field) const {
     for (int i = 0; i < N; ++i) {
       double* p = field + 3 * static_cast<std::ptrdiff_t>(node[i]);
       store(p, loadStored(p) + from[i]);
@@ -34,43 +34,43 @@ template <int N> struct Corners {
   }
 };
 
-template <int N> TIEFMU_INLINE Pack weighted(const double* phi, const Pack* u) {
-  Pack sum = phi[0] * u[0];
+template <int N> TIEFMU_INLINE SimdVec3 weighted(const double* phi, const SimdVec3* u) {
+  SimdVec3 sum = phi[0] * u[0];
   for (int i = 1; i < N; ++i) sum += phi[i] * u[i];
   return sum;
 }
 
-template <int N> TIEFMU_INLINE Pack mean(const Pack* u) {
-  Pack sum = u[0];
+template <int N> TIEFMU_INLINE SimdVec3 mean(const SimdVec3* u) {
+  SimdVec3 sum = u[0];
   for (int i = 1; i < N; ++i) sum += u[i];
   return (1.0 / N) * sum;
 }
 
-template <int N> TIEFMU_INLINE void arms(const SegmentFrame& frame, Pack* r) {
+template <int N> TIEFMU_INLINE void arms(const SegmentFrame& frame, SimdVec3* r) {
   for (int i = 0; i < N; ++i) r[i] = load(frame.arm + 3 * i);
 }
 
 // sum r x v, of unit masses at the corners: Ibar w
-template <int N> TIEFMU_INLINE Pack angularMomentum(const Pack* r, const Pack* v) {
-  Pack sum = crossZxy(r[0], v[0]);
+template <int N> TIEFMU_INLINE SimdVec3 angularMomentum(const SimdVec3* r, const SimdVec3* v) {
+  SimdVec3 sum = crossZxy(r[0], v[0]);
   for (int i = 1; i < N; ++i) sum += crossZxy(r[i], v[i]);
   return yzx(sum);
 }
 
-// Four segments side by side: each is a long chain of dependent operations.
-struct Four {
-  Lanes xx, xy, xz, yy, yz, zz;  // symmetric matrices
-  TIEFMU_INLINE Lanes3 operator*(const Lanes3& a) const {
+// Symmetric matrices of four segments side by side: each is a long chain of dependent operations.
+struct Simd4SymMat3 {
+  Simd4 xx, xy, xz, yy, yz, zz;
+  TIEFMU_INLINE Simd4Vec3 operator*(const Simd4Vec3& a) const {
     return {xx * a.x + xy * a.y + xz * a.z, xy * a.x + yy * a.y + yz * a.z, xz * a.x + yz * a.y + zz * a.z};
   }
 };
 
 // Arms from the centre of the nodes, and Ibar^-1.
-template <int N> TIEFMU_INLINE Four frameOf(Lanes3* x, Lanes3& centre) {
+template <int N> TIEFMU_INLINE Simd4SymMat3 frameOf(Simd4Vec3* x, Simd4Vec3& centre) {
   centre = x[0];
   for (int i = 1; i < N; ++i) centre = centre + x[i];
   centre = (1.0 / N) * centre;
-  Lanes xx = {}, xy = {}, xz = {}, yy = {}, yz = {}, zz = {};
+  Simd4 xx = {}, xy = {}, xz = {}, yy = {}, yz = {}, zz = {};
   for (int i = 0; i < N; ++i) {
     x[i] = x[i] - centre;
     xx += x[i].x * x[i].x;
@@ -80,19 +80,19 @@ template <int N> TIEFMU_INLINE Four frameOf(Lanes3* x, Lanes3& centre) {
     yz += x[i].y * x[i].z;
     zz += x[i].z * x[i].z;
   }
-  const Lanes a = yy + zz, b = -xy, c = -xz, d = xx + zz, e = -yz, f = xx + yy;
-  const Lanes A = d * f - e * e, B = c * e - b * f, C = b * e - c * d;
-  const Lanes s = 1.0 / (a * A + b * B + c * C);
+  const Simd4 a = yy + zz, b = -xy, c = -xz, d = xx + zz, e = -yz, f = xx + yy;
+  const Simd4 A = d * f - e * e, B = c * e - b * f, C = b * e - c * d;
+  const Simd4 s = 1.0 / (a * A + b * B + c * C);
   return {s * A, s * B, s * C, s * (a * f - c * c), s * (b * c - a * e), s * (a * d - b * b)};
 }
 
 template <int N>
-TIEFMU_INLINE void storeFrames(const Lanes3* arm, const Lanes3& centre, const Four& inverse, SegmentFrame* frame,
-                               int count) {
+TIEFMU_INLINE void storeFrames(const Simd4Vec3* arm, const Simd4Vec3& centre, const Simd4SymMat3& inverse,
+                               SegmentFrame* frame, int count) {
   constexpr std::ptrdiff_t stride = sizeof(SegmentFrame) / sizeof(double);
   static_assert(offsetof(SegmentFrame, centre) == 12 * sizeof(double) && stride == 24);
   double* to = frame->arm;
-  const Lanes3 last = N == 4 ? arm[3] : Lanes3{};
+  const Simd4Vec3 last = N == 4 ? arm[3] : Simd4Vec3{};
   storeFour(to, stride, count, arm[0].x, arm[0].y, arm[0].z, arm[1].x);
   storeFour(to + 4, stride, count, arm[1].y, arm[1].z, arm[2].x, arm[2].y);
   storeFour(to + 8, stride, count, arm[2].z, last.x, last.y, last.z);
@@ -102,7 +102,7 @@ TIEFMU_INLINE void storeFrames(const Lanes3* arm, const Lanes3& centre, const Fo
 }
 
 // Of sums of x - x, which is 0 only where x is finite.
-TIEFMU_INLINE bool sound(const Lanes& sum) { return sum[0] + sum[1] + sum[2] + sum[3] == 0; }
+TIEFMU_INLINE bool allFinite(const Simd4& sum) { return sum[0] + sum[1] + sum[2] + sum[3] == 0; }
 
 // Segments that a loop takes at a time, where several short loops hide the latency that one long one shows.
 constexpr int together = 32;
@@ -119,7 +119,7 @@ template <int N, class Body> TIEFMU_INLINE void eachFourSegments(const TieView& 
     const int last = end - 1, count = last - e < 3 ? last - e + 1 : 4;
     const int* node[4];
     for (int k = 0; k < 4; ++k) node[k] = tie.node + N * static_cast<std::ptrdiff_t>(e + k < last ? e + k : last);
-    const auto gather = [&](const double* field, Lanes3* to) TIEFMU_INLINED {
+    const auto gather = [&](const double* field, Simd4Vec3* to) TIEFMU_INLINED {
       const auto at = [&](int k, int i) TIEFMU_INLINED { return field + 3 * static_cast<std::ptrdiff_t>(node[k][i]); };
       for (int i = 0; i < N; ++i) to[i] = loadFour(at(0, i), at(1, i), at(2, i), at(3, i));
     };
@@ -154,11 +154,11 @@ template <class Body> TIEFMU_INLINE void byCorners(const TieView& tie, Body body
 template <int N> TIEFMU_INLINE void mapTranslation(const TieView& tie, const double* u, double* us) {
   const double* weight = weights<N>(tie);
   eachSegment<N>(tie, [&](int, Corners<N> nodes, std::ptrdiff_t s, std::ptrdiff_t last) TIEFMU_INLINED {
-    Pack ui[N];
+    SimdVec3 ui[N];
     nodes.gather(u, ui);
     for (; s < last; ++s) {
-      ahead(weight + N * s);
-      aheadToWrite(us + 3 * s);
+      prefetch(weight + N * s);
+      prefetchToWrite(us + 3 * s);
       store(us + 3 * s, weighted<N>(weight + N * s, ui));
     }
   });
@@ -169,15 +169,15 @@ TIEFMU_INLINE void mapRotation(const TieView& tie, const double* offset, const d
                                double* us, double* turns) {
   const double* weight = weights<N>(tie);
   eachSegment<N>(tie, [&](int, Corners<N> nodes, std::ptrdiff_t s, std::ptrdiff_t last) TIEFMU_INLINED {
-    Pack ui[N], wi[N];
+    SimdVec3 ui[N], wi[N];
     nodes.gather(u, ui);
     nodes.gather(turn, wi);
     for (; s < last; ++s) {
-      ahead(offset + 3 * s);
-      ahead(weight + N * s);
-      aheadToWrite(us + 3 * s);
-      aheadToWrite(turns + 3 * s);
-      const Pack w = weighted<N>(weight + N * s, wi);
+      prefetch(offset + 3 * s);
+      prefetch(weight + N * s);
+      prefetchToWrite(us + 3 * s);
+      prefetchToWrite(turns + 3 * s);
+      const SimdVec3 w = weighted<N>(weight + N * s, wi);
       store(us + 3 * s, weighted<N>(weight + N * s, ui) + cross(w, load(offset + 3 * s)));
       store(turns + 3 * s, w);
     }
@@ -187,22 +187,22 @@ TIEFMU_INLINE void mapRotation(const TieView& tie, const double* offset, const d
 template <int N>
 TIEFMU_INLINE void mapMeanMotion(const TieView& tie, TieGeometry geometry, const double* u, double* us, double* turns) {
   eachRun(tie, [&](int first, int last) TIEFMU_INLINED {
-    Pack centre[together], w[together];
+    SimdVec3 centre[together], w[together];
     for (int e = first; e < last; ++e) {
-      frameAhead(geometry.frame + e);
-      Pack ui[N], r[N];
+      prefetchFrame(geometry.frame + e);
+      SimdVec3 ui[N], r[N];
       corners<N>(tie, e).gather(u, ui);
       arms<N>(geometry.frame[e], r);
       centre[e - first] = mean<N>(ui);
       w[e - first] = angularMomentum<N>(r, ui);
     }
-    for (int e = first; e < last; ++e) w[e - first] = loadColumns(geometry.frame[e].inverse) * w[e - first];
+    for (int e = first; e < last; ++e) w[e - first] = loadMat3(geometry.frame[e].inverse) * w[e - first];
     for (int e = first; e < last; ++e) {
-      const Pack c = centre[e - first], spin = w[e - first];
+      const SimdVec3 c = centre[e - first], spin = w[e - first];
       for (std::ptrdiff_t s = tie.firstSlave + tie.begin[e]; s < tie.firstSlave + tie.begin[e + 1]; ++s) {
-        ahead(geometry.offset + 3 * s);
-        aheadToWrite(us + 3 * s);
-        aheadToWrite(turns + 3 * s);
+        prefetch(geometry.offset + 3 * s);
+        prefetchToWrite(us + 3 * s);
+        prefetchToWrite(turns + 3 * s);
         store(us + 3 * s, c + cross(spin, load(geometry.offset + 3 * s)));
         store(turns + 3 * s, spin);
       }
@@ -226,11 +226,11 @@ void mapMotion(const TieView& tie, TieGeometry geometry, const double* u, const 
 template <int N> TIEFMU_INLINE void distributeTranslation(const TieView& tie, const double* force, double* f) {
   const double* weight = weights<N>(tie);
   eachSegment<N>(tie, [&](int, Corners<N> nodes, std::ptrdiff_t s, std::ptrdiff_t last) TIEFMU_INLINED {
-    Pack fi[N] = {};
+    SimdVec3 fi[N] = {};
     for (; s < last; ++s) {
-      ahead(force + 3 * s);
-      ahead(weight + N * s);
-      const Pack F = load(force + 3 * s);
+      prefetch(force + 3 * s);
+      prefetch(weight + N * s);
+      const SimdVec3 F = load(force + 3 * s);
       for (int i = 0; i < N; ++i) fi[i] += weight[N * s + i] * F;
     }
     nodes.add(fi, f);
@@ -242,20 +242,20 @@ TIEFMU_INLINE void distributeRotation(const TieView& tie, const double* offset, 
                                       const double* moment, double* f, double* t) {
   const double* weight = weights<N>(tie);
   const std::ptrdiff_t end = tie.firstSlave + tie.begin[tie.range.last];
-  Pack F = {}, M = {};
+  SimdVec3 F = {}, M = {};
   const auto next = [&](std::ptrdiff_t s) TIEFMU_INLINED {
-    ahead(force + 3 * s);
-    ahead(moment + 3 * s);
-    ahead(offset + 3 * s);
-    ahead(weight + N * s);
+    prefetch(force + 3 * s);
+    prefetch(moment + 3 * s);
+    prefetch(offset + 3 * s);
+    prefetch(weight + N * s);
     F = load(force + 3 * s);
     M = load(moment + 3 * s) + cross(load(offset + 3 * s), F);
   };
   if (tie.range.first < tie.range.last) next(tie.firstSlave + tie.begin[tie.range.first]);
   eachSegment<N>(tie, [&](int, Corners<N> nodes, std::ptrdiff_t s, std::ptrdiff_t last) TIEFMU_INLINED {
-    Pack fi[N] = {}, ti[N] = {};
+    SimdVec3 fi[N] = {}, ti[N] = {};
     for (; s < last; ++s) {
-      const Pack F0 = F, M0 = M;
+      const SimdVec3 F0 = F, M0 = M;
       if (s + 1 < end) next(s + 1);  // ahead of its use, as its latency is longer than this loop's work
       for (int i = 0; i < N; ++i) {
         fi[i] += weight[N * s + i] * F0;
@@ -271,15 +271,15 @@ template <int N>
 TIEFMU_INLINE void distributeMeanMotion(const TieView& tie, TieGeometry geometry, const double* force,
                                         const double* moment, double* f) {
   eachRun(tie, [&](int first, int last) TIEFMU_INLINED {
-    Pack F[together], A[together];
+    SimdVec3 F[together], A[together];
     for (int e = first; e < last; ++e) {
-      frameAhead(geometry.frame + e);
-      Pack sum = {}, moments = {}, levers = {};
+      prefetchFrame(geometry.frame + e);
+      SimdVec3 sum = {}, moments = {}, levers = {};
       for (std::ptrdiff_t s = tie.firstSlave + tie.begin[e]; s < tie.firstSlave + tie.begin[e + 1]; ++s) {
-        const Pack one = load(force + 3 * s);
-        ahead(force + 3 * s);
-        ahead(moment + 3 * s);
-        ahead(geometry.offset + 3 * s);
+        const SimdVec3 one = load(force + 3 * s);
+        prefetch(force + 3 * s);
+        prefetch(moment + 3 * s);
+        prefetch(geometry.offset + 3 * s);
         sum += one;
         moments += load(moment + 3 * s);
         levers += crossZxy(load(geometry.offset + 3 * s), one);
@@ -287,11 +287,11 @@ TIEFMU_INLINE void distributeMeanMotion(const TieView& tie, TieGeometry geometry
       F[e - first] = sum;
       A[e - first] = moments + yzx(levers);
     }
-    for (int e = first; e < last; ++e) A[e - first] = loadColumns(geometry.frame[e].inverse) * A[e - first];
+    for (int e = first; e < last; ++e) A[e - first] = loadMat3(geometry.frame[e].inverse) * A[e - first];
     for (int e = first; e < last; ++e) {
-      Pack r[N], fi[N];
+      SimdVec3 r[N], fi[N];
       arms<N>(geometry.frame[e], r);
-      const Pack share = (1.0 / N) * F[e - first];
+      const SimdVec3 share = (1.0 / N) * F[e - first];
       for (int i = 0; i < N; ++i) fi[i] = share + cross(A[e - first], r[i]);
       corners<N>(tie, e).add(fi, f);
     }
@@ -315,10 +315,10 @@ template <int N>
 TIEFMU_INLINE void biasRotation(const TieView& tie, const double* offset, const double* spin, double* as) {
   const double* weight = weights<N>(tie);
   eachSegment<N>(tie, [&](int, Corners<N> nodes, std::ptrdiff_t s, std::ptrdiff_t last) TIEFMU_INLINED {
-    Pack wi[N];
+    SimdVec3 wi[N];
     nodes.gather(spin, wi);
     for (; s < last; ++s) {
-      const Pack w = weighted<N>(weight + N * s, wi);
+      const SimdVec3 w = weighted<N>(weight + N * s, wi);
       store(as + 3 * s, load(as + 3 * s) + cross(w, cross(w, load(offset + 3 * s))));
     }
   });
@@ -328,20 +328,20 @@ TIEFMU_INLINE void biasRotation(const TieView& tie, const double* offset, const 
 template <int N>
 TIEFMU_INLINE void biasMeanMotion(const TieView& tie, TieGeometry geometry, const double* v, double* as, double* zs) {
   eachSegment<N>(tie, [&](int e, Corners<N> nodes, std::ptrdiff_t s, std::ptrdiff_t last) TIEFMU_INLINED {
-    Pack vi[N], r[N];
+    SimdVec3 vi[N], r[N];
     nodes.gather(v, vi);
     const SegmentFrame& frame = geometry.frame[e];
     arms<N>(frame, r);
-    const Columns inverse = loadColumns(frame.inverse);
-    const Pack w = inverse * angularMomentum<N>(r, vi), centre = mean<N>(vi);
-    Pack rate = {};
+    const SimdMat3 inverse = loadMat3(frame.inverse);
+    const SimdVec3 w = inverse * angularMomentum<N>(r, vi), centre = mean<N>(vi);
+    SimdVec3 rate = {};
     for (int i = 0; i < N; ++i) {
-      const Pack rDot = vi[i] - centre;
+      const SimdVec3 rDot = vi[i] - centre;
       rate += (2 * dot(r[i], rDot)) * w - dot(r[i], w) * rDot - dot(rDot, w) * r[i];
     }
-    const Pack z = -(inverse * rate);
+    const SimdVec3 z = -(inverse * rate);
     for (; s < last; ++s) {
-      const Pack d = load(geometry.offset + 3 * s);
+      const SimdVec3 d = load(geometry.offset + 3 * s);
       store(as + 3 * s, load(as + 3 * s) + cross(z, d) + cross(w, cross(w, d)));
       store(zs + 3 * s, load(zs + 3 * s) + z);
     }
@@ -363,9 +363,9 @@ void place(const TieView& tie, TieGeometry geometry, const double* position, dou
     const double* weight = weights<N>(tie);
     const bool centred = tie.coupling == Coupling::meanMotion;
     eachSegment<N>(tie, [&](int, Corners<N> nodes, std::ptrdiff_t s, std::ptrdiff_t last) TIEFMU_INLINED {
-      Pack xi[N];
+      SimdVec3 xi[N];
       nodes.gather(position, xi);
-      const Pack centre = mean<N>(xi);
+      const SimdVec3 centre = mean<N>(xi);
       for (; s < last; ++s)
         store(xs + 3 * s, (centred ? centre : weighted<N>(weight + N * s, xi)) + load(geometry.offset + 3 * s));
     });
@@ -373,18 +373,18 @@ void place(const TieView& tie, TieGeometry geometry, const double* position, dou
 }
 
 bool updateFrames(const TieView& tie, const double* position, SegmentFrame* frame) {
-  Lanes unsound = {};
+  Simd4 nonFinite = {};
   byCorners(tie, [&](auto n) TIEFMU_INLINED {
     constexpr int N = decltype(n)::value;
     eachFourSegments<N>(tie, tie.range.first, tie.range.last, [&](int e, int count, auto gather) TIEFMU_INLINED {
-      Lanes3 x[N], centre;
+      Simd4Vec3 x[N], centre;
       gather(position, x);
-      const Four inverse = frameOf<N>(x, centre);
+      const Simd4SymMat3 inverse = frameOf<N>(x, centre);
       storeFrames<N>(x, centre, inverse, frame + e, count);
-      unsound += inverse.xx - inverse.xx;
+      nonFinite += inverse.xx - inverse.xx;
     });
   });
-  return sound(unsound);
+  return allFinite(nonFinite);
 }
 
 // sin(a)/a and (1 - cos a)/a^2 of steps above 2 degrees.
@@ -394,7 +394,7 @@ TIEFMU_INLINE void large(double a2, double& s, double& c) {
   s = std::sin(a) / a;
   c = 2 * half * half / a2;
 }
-TIEFMU_INLINE void large(const Lanes& a2, Lanes& s, Lanes& c) {
+TIEFMU_INLINE void large(const Simd4& a2, Simd4& s, Simd4& c) {
   if (!((a2[0] >= 1e-3) | (a2[1] >= 1e-3) | (a2[2] >= 1e-3) | (a2[3] >= 1e-3))) return;
   for (int k = 0; k < 4; ++k) {
     double sk = s[k], ck = c[k];
@@ -406,13 +406,13 @@ TIEFMU_INLINE void large(const Lanes& a2, Lanes& s, Lanes& c) {
 
 // d + sin(a)/a (angle x d) + (1 - cos a)/a^2 angle x (angle x d), a = |angle| [Rodrigues 1840], at its length, of which
 // `inverse` is 1/square.
-template <class N> TIEFMU_INLINE Three<N> turned(const Three<N>& angle, const Three<N>& d, const N& inverse) {
+template <class N> TIEFMU_INLINE Vec3Of<N> turned(const Vec3Of<N>& angle, const Vec3Of<N>& d, const N& inverse) {
   const N a2 = dot(angle, angle);
   // The terms left out are below 1e-17.
   N s = 1 + a2 * (-1.0 / 6 + a2 * (1.0 / 120 - a2 * (1.0 / 5040)));
   N c = 0.5 + a2 * (-1.0 / 24 + a2 * (1.0 / 720 - a2 * (1.0 / 40320)));
   large(a2, s, c);
-  const Three<N> once = cross(angle, d), next = d + s * once + c * cross(angle, once);
+  const Vec3Of<N> once = cross(angle, d), next = d + s * once + c * cross(angle, once);
   // One Newton step of 1/sqrt: exact, as the length is off by rounding only.
   const N scale = 1.5 - 0.5 * dot(next, next) * inverse;
   return scale * next;
@@ -428,8 +428,8 @@ void turnOffsets(const TieView& tie, double h, const double* spin, const double*
       const double* u = angle + 3 * k;
       double* d = offset + 3 * (first + k);
       const double* i = inverseLength2 + first + k;
-      const Lanes inverse = {i[0], i[1], i[2], i[3]};
-      const Lanes3 next = turned(loadFour(u, u + 3, u + 6, u + 9), loadFour(d, d + 3, d + 6, d + 9), inverse);
+      const Simd4 inverse = {i[0], i[1], i[2], i[3]};
+      const Simd4Vec3 next = turned(loadFour(u, u + 3, u + 6, u + 9), loadFour(d, d + 3, d + 6, d + 9), inverse);
       for (int m = 0; m < 4; ++m) {
         d[3 * m] = next.x[m];
         d[3 * m + 1] = next.y[m];
@@ -442,7 +442,7 @@ void turnOffsets(const TieView& tie, double h, const double* spin, const double*
     constexpr int N = decltype(n)::value;
     const double* weight = weights<N>(tie);
     eachSegment<N>(tie, [&](int, Corners<N> nodes, std::ptrdiff_t s, std::ptrdiff_t last) TIEFMU_INLINED {
-      Pack wi[N];
+      SimdVec3 wi[N];
       nodes.gather(spin, wi);
       for (int i = 0; i < N; ++i) wi[i] = h * wi[i];
       while (s < last) {
@@ -460,8 +460,8 @@ void turnOffsets(const TieView& tie, double h, const double* spin, const double*
   for (int k = fours; k < count; ++k) {
     const double* u = angle + 3 * k;
     double* d = offset + 3 * (first + k - fours);
-    const Three<double> next =
-        turned(Three<double>{u[0], u[1], u[2]}, Three<double>{d[0], d[1], d[2]}, inverseLength2[first + k - fours]);
+    const Vec3Of<double> next =
+        turned(Vec3Of<double>{u[0], u[1], u[2]}, Vec3Of<double>{d[0], d[1], d[2]}, inverseLength2[first + k - fours]);
     d[0] = next.x;
     d[1] = next.y;
     d[2] = next.z;
@@ -469,43 +469,43 @@ void turnOffsets(const TieView& tie, double h, const double* spin, const double*
 }
 
 // q <- (1, u) q, scaled to unit length, for the first `count` of four quaternions.
-TIEFMU_INLINE void turnQuaternions(const Lanes3& u, int count, double* q) {
+TIEFMU_INLINE void turnQuaternions(const Simd4Vec3& u, int count, double* q) {
   const auto old = [&](int m) TIEFMU_INLINED {
     const auto of = [&](int k) TIEFMU_INLINED { return q[4 * (k < count ? k : count - 1) + m]; };
-    return Lanes{of(0), of(1), of(2), of(3)};
+    return Simd4{of(0), of(1), of(2), of(3)};
   };
-  const Lanes a = old(0), b = old(1), c = old(2), d = old(3);
-  const Lanes w = a - u.x * b - u.y * c - u.z * d, i = b + u.x * a + u.y * d - u.z * c,
+  const Simd4 a = old(0), b = old(1), c = old(2), d = old(3);
+  const Simd4 w = a - u.x * b - u.y * c - u.z * d, i = b + u.x * a + u.y * d - u.z * c,
               j = c + u.y * a + u.z * b - u.x * d, k = d + u.z * a + u.x * c - u.y * b;
-  const Lanes scale = 1.0 / root(w * w + i * i + j * j + k * k);
+  const Simd4 scale = 1.0 / root(w * w + i * i + j * j + k * k);
   storeFour(q, 4, count, scale * w, scale * i, scale * j, scale * k);
 }
 
 bool moveSegments(const TieView& tie, double h, const double* position, const double* velocity, SegmentFrame* frame,
                   double* rotation) {
-  Lanes unsound = {};
+  Simd4 nonFinite = {};
   eachRun(tie, [&](int first, int last) TIEFMU_INLINED {
-    Lanes3 turn[together / 4];
+    Simd4Vec3 turn[together / 4];
     byCorners(tie, [&](auto n) TIEFMU_INLINED {
       constexpr int N = decltype(n)::value;
       eachFourSegments<N>(tie, first, last, [&](int e, int count, auto gather) TIEFMU_INLINED {
-        Lanes3 x[N], v[N], r[N], centre;
+        Simd4Vec3 x[N], v[N], r[N], centre;
         gather(position, x);
         gather(velocity, v);
         if (rotation) {
           for (int i = 0; i < N; ++i) r[i] = x[i] + (0.5 * h) * v[i];
-          const Four inverse = frameOf<N>(r, centre);
-          Lanes3 sum = cross(r[0], v[0]);
+          const Simd4SymMat3 inverse = frameOf<N>(r, centre);
+          Simd4Vec3 sum = cross(r[0], v[0]);
           for (int i = 1; i < N; ++i) sum = sum + cross(r[i], v[i]);
-          const Lanes3 u = (0.5 * h) * (inverse * sum);
-          unsound += u.x - u.x;
+          const Simd4Vec3 u = (0.5 * h) * (inverse * sum);
+          nonFinite += u.x - u.x;
           turn[(e - first) / 4] = u;
         }
         // The end as the positions are advanced, so that a restored state finds the same bits.
         for (int i = 0; i < N; ++i) x[i] = x[i] + h * v[i];
-        const Four inverse = frameOf<N>(x, centre);
+        const Simd4SymMat3 inverse = frameOf<N>(x, centre);
         storeFrames<N>(x, centre, inverse, frame + e, count);
-        unsound += inverse.xx - inverse.xx;
+        nonFinite += inverse.xx - inverse.xx;
       });
     });
     if (!rotation) return;
@@ -515,20 +515,20 @@ bool moveSegments(const TieView& tie, double h, const double* position, const do
     if (left > 0)
       turnQuaternions(turn[(last - first) / 4], left, rotation + 4 * static_cast<std::ptrdiff_t>(last - left));
   });
-  return sound(unsound);
+  return allFinite(nonFinite);
 }
 
 void rotateOffsets(const TieView& tie, const double* rotation, const double* initialOffset, double* offset) {
   for (int e = tie.range.first; e < tie.range.last; ++e) {
     const double* q = rotation + 4 * static_cast<std::ptrdiff_t>(e);
     const double w = q[0], x = q[1], y = q[2], z = q[3];
-    const Pack c0 = pack(1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y));
-    const Pack c1 = pack(2 * (x * y - w * z), 1 - 2 * (x * x + z * z), 2 * (y * z + w * x));
-    const Pack c2 = pack(2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y));
+    const SimdVec3 c0 = simdVec3(1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y));
+    const SimdVec3 c1 = simdVec3(2 * (x * y - w * z), 1 - 2 * (x * x + z * z), 2 * (y * z + w * x));
+    const SimdVec3 c2 = simdVec3(2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y));
     for (std::ptrdiff_t s = tie.firstSlave + tie.begin[e]; s < tie.firstSlave + tie.begin[e + 1]; ++s) {
       const double* d0 = initialOffset + 3 * s;
-      ahead(d0);
-      aheadToWrite(offset + 3 * s);
+      prefetch(d0);
+      prefetchToWrite(offset + 3 * s);
       store(offset + 3 * s, d0[0] * c0 + d0[1] * c1 + d0[2] * c2);
     }
   }
@@ -538,10 +538,10 @@ void meanSpin(const TieView& tie, const SegmentFrame* frame, const double* veloc
   byCorners(tie, [&](auto n) TIEFMU_INLINED {
     constexpr int N = decltype(n)::value;
     eachSegment<N>(tie, [&](int e, Corners<N> nodes, std::ptrdiff_t, std::ptrdiff_t) TIEFMU_INLINED {
-      Pack v[N], r[N];
+      SimdVec3 v[N], r[N];
       nodes.gather(velocity, v);
       arms<N>(frame[e], r);
-      store(spin + 3 * static_cast<std::ptrdiff_t>(e), loadColumns(frame[e].inverse) * angularMomentum<N>(r, v));
+      store(spin + 3 * static_cast<std::ptrdiff_t>(e), loadMat3(frame[e].inverse) * angularMomentum<N>(r, v));
     });
   });
 }
