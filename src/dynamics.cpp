@@ -108,7 +108,7 @@ void Dynamics::setStart() {
   *field(Field::timeStep) = model.settings.timeStep;
   *field(Field::safety) = model.settings.safety;
   *field(Field::threads) = std::max(1, model.settings.threads);
-  workers_.reset();
+  pool_.reset();
   fill(field(Field::slaveMass), layout[Field::slaveMass].count, model.slaveMass);
   fill(field(Field::slaveInertia), layout[Field::slaveInertia].count, model.slaveInertia);
   fill(field(Field::velocity), layout[Field::velocity].count, model.nodeVelocity);
@@ -127,11 +127,11 @@ void Dynamics::startThreads() {
     throw SceneError("integrator.threads is " + number(threads) + "; it must be a whole number from 1 to " +
                      std::to_string(mostThreads));
   const int wanted = model.shareable() ? static_cast<int>(threads) : 1;
-  if (wanted == (workers_ ? workers_->threads() : 1)) return;
-  workers_.reset();
+  if (wanted == (pool_ ? pool_->threads() : 1)) return;
+  pool_.reset();
   if (wanted == 1) return;
   try {
-    workers_ = std::make_unique<Workers>(wanted);
+    pool_ = std::make_unique<ThreadPool>(wanted);
   } catch (const std::system_error& e) {
     throw SceneError("integrator.threads is " + number(threads) + ", more than the system gives: " + e.what());
   }
@@ -160,7 +160,8 @@ void Dynamics::prepareMass() {
   if (!model.finite())
     eachGroup([&](const TieGroup& group, SegmentRange range, TieGeometry, std::size_t g) {
       if (group.coupling == Coupling::meanMotion)
-        if (!updateFrames(group, range, model.nodePosition.data(), frames_.data() + firstFrame_[g])) sound_ = false;
+        if (!updateFrames(group, range, model.nodePosition.data(), frames_.data() + firstFrame_[g]))
+          noneCollapsed_ = false;
     });
   updateGeometry();
   if (inertia_) updateInertia();
@@ -180,15 +181,15 @@ void Dynamics::updateGeometry() {
   eachPart([&](const TieGroup& group, SegmentRange range, TieGeometry, std::size_t g) {
     if (group.coupling != Coupling::meanMotion) return;
     if (has(Field::position) && !updateFrames(group, range, field(Field::position), frames_.data() + firstFrame_[g]))
-      sound_ = false;
+      noneCollapsed_ = false;
     if (has(Field::segmentRotation))
       rotateOffsets(group, range, field(Field::segmentRotation) + 4 * firstFrame_[g], model.slaveOffset.data(),
                     field(Field::offset));
   });
 }
 
-std::string Dynamics::collapsed() {
-  if (sound_) return {};
+std::string Dynamics::findCollapsedSegment() {
+  if (noneCollapsed_) return {};
   std::size_t k = 0;
   const double* rotation = has(Field::segmentRotation) ? data + layout[Field::segmentRotation].offset : nullptr;
   for (const TieGroup& group : model.groups) {
@@ -204,7 +205,7 @@ std::string Dynamics::collapsed() {
       return ids;
     }
   }
-  sound_ = true;
+  noneCollapsed_ = true;
   return {};
 }
 
@@ -318,7 +319,7 @@ void Dynamics::gatherLoads() {
   turnRate_ = std::sqrt(rate2);
 }
 
-void Dynamics::findTurnRate(const double* v, const double* w) {
+void Dynamics::updateTurnRate(const double* v, const double* w) {
   double rate2 = turnRate_ * turnRate_;
   for (int i = model.freeBegin(); i < model.rotating(); ++i) rate2 = std::max(rate2, at(w, i).squaredNorm());
   eachGroup([&](const TieGroup& group, SegmentRange, TieGeometry shape, std::size_t) {
@@ -338,20 +339,20 @@ void Dynamics::distributeAll(const double* force, const double* moment, double* 
     const auto part = [&](int first, int last) {
       distributeLoads(group, {first, last}, geometry(g), force, moment, f, t);
     };
-    if (!workers_) {
+    if (!pool_) {
       part(0, group.segments());
       continue;
     }
     // Parts touch no common node, so that the sums do not depend on who is first; the border comes after all of them.
     const std::vector<int>& end = group.partEnd;
-    workers_->each(static_cast<int>(end.size()), [&](int k) { part(k == 0 ? 0 : end[k - 1], end[k]); });
+    pool_->each(static_cast<int>(end.size()), [&](int k) { part(k == 0 ? 0 : end[k - 1], end[k]); });
     part(end.back(), group.segments());
   }
 }
 
 void Dynamics::evaluateReactions() {
   gatherLoads();
-  if (hasBias()) findTurnRate(velocityFor(Field::predicted), spinFor(Field::predicted));
+  if (hasBias()) updateTurnRate(velocityFor(Field::predicted), spinFor(Field::predicted));
   const Slice reactions = layout[Field::reactionForce];  // moments follow
   eachBlock(reactions.count + layout[Field::reactionMoment].count, [&](std::size_t first, std::size_t last) {
     std::fill(data + reactions.offset + first, data + reactions.offset + last, 0.0);
@@ -497,7 +498,8 @@ void Dynamics::drift(double h, double ahead) {
     if (group.coupling != Coupling::meanMotion) return;
     double* q = turns ? field(Field::segmentRotation) + 4 * firstFrame_[g] : nullptr;
     if (model.finite()) {
-      if (!moveSegments(group, range, h, field(Field::position), v, frames_.data() + firstFrame_[g], q)) sound_ = false;
+      if (!moveSegments(group, range, h, field(Field::position), v, frames_.data() + firstFrame_[g], q))
+        noneCollapsed_ = false;
       if (turns) rotateOffsets(group, range, q, model.slaveOffset.data(), field(Field::offset));
     } else if (turns) {
       for (int e = range.first; e < range.last; ++e) {

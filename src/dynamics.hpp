@@ -12,8 +12,8 @@
 #include "layout.hpp"
 #include "port.hpp"
 #include "spring.hpp"
+#include "thread_pool.hpp"
 #include "tie.hpp"
-#include "workers.hpp"
 
 namespace tiefmu {
 
@@ -36,7 +36,7 @@ class Dynamics {
   void updateMass();  // the mass matrix at the present geometry, as `evaluate` does. Throws SceneError
   // Node ids of a meanMotion segment whose nodes have come to lie on a line, so that its motion is not defined: "1, 2,
   // 3". Empty: none.
-  std::string collapsed();
+  std::string findCollapsedSegment();
 
   // Loads at the present geometry with `lagged` velocities in the dampers: T^T f_s into the reactions, then the free
   // nodes' accelerations, with `predicted` velocities in the bias.
@@ -112,7 +112,7 @@ class Dynamics {
   void distributeAll(const double* force, const double* moment, double* f, double* t);
   void slaveAccelerations(const double* a, const double* z, const double* v, const double* w);
   void inertialLoads();
-  void findTurnRate(const double* v, const double* w);
+  void updateTurnRate(const double* v, const double* w);
   void updateInertia();
   void startThreads();
   void advance(std::size_t count, double h, const double* rate, double* value);
@@ -136,10 +136,10 @@ class Dynamics {
   const double* loadOnNodes_ = nullptr;  // `nodeLoad_`, or the inputs where nothing adds to them
   const double* momentOnNodes_ = nullptr;
   double strain_ = 0, dissipation_ = 0, turnRate_ = 0;
-  std::atomic<bool> sound_{true};  // no kernel has met a collapsed segment since the last look
+  std::atomic<bool> noneCollapsed_{true};  // no kernel has met a collapsed segment since the last look
   bool gravity_ = false, offsetsTurn_ = false, bias_ = false, knownAccelerations_ = false, drivenMove_ = true;
   std::unique_ptr<ConsistentInertia> inertia_;
-  std::unique_ptr<Workers> workers_;        // none where one thread does it all
+  std::unique_ptr<ThreadPool> pool_;        // none where one thread does it all
   std::shared_ptr<Derivative> derivative_;  // scratch of `directionalDerivative`, made at its first call
 };
 
@@ -149,11 +149,11 @@ template <class Body> void Dynamics::eachGroup(Body body) const {
 }
 
 template <class Body> void Dynamics::eachPart(Body body) const {
-  if (!workers_) return eachGroup(body);
+  if (!pool_) return eachGroup(body);
   for (std::size_t g = 0; g < model.groups.size(); ++g) {
     const TieGroup& group = model.groups[g];
     const std::vector<int>& end = group.partEnd;
-    workers_->each(static_cast<int>(end.size()) + 1, [&](int k) {
+    pool_->each(static_cast<int>(end.size()) + 1, [&](int k) {
       const int first = k == 0 ? 0 : end[k - 1], last = k < static_cast<int>(end.size()) ? end[k] : group.segments();
       if (first < last) body(group, SegmentRange{first, last}, geometry(g), g);
     });
@@ -162,9 +162,9 @@ template <class Body> void Dynamics::eachPart(Body body) const {
 
 template <class Body> void Dynamics::eachBlock(std::size_t count, Body body) const {
   constexpr std::size_t smallest = 4096, most = 64;
-  const std::size_t blocks = workers_ ? std::clamp<std::size_t>(count / smallest, 1, most) : 1;
+  const std::size_t blocks = pool_ ? std::clamp<std::size_t>(count / smallest, 1, most) : 1;
   if (blocks == 1) return body(std::size_t{0}, count);
-  workers_->each(static_cast<int>(blocks), [&](int k) { body(count * k / blocks, count * (k + 1) / blocks); });
+  pool_->each(static_cast<int>(blocks), [&](int k) { body(count * k / blocks, count * (k + 1) / blocks); });
 }
 
 template <class Body> void Dynamics::eachSprung(Body body) const {

@@ -188,7 +188,7 @@ void Ports::gather(const double* f, const double* t, double* force, double* mome
   }
 }
 
-std::string Ports::collapsed() const {
+std::string Ports::findCollapsed() const {
   for (std::size_t k = 0; k < shapes_.size(); ++k)
     if (!std::isfinite(shapes_[k].inverse.sum())) return slavePort(k).name;
   return {};

@@ -47,7 +47,7 @@ class Ports {
   // Arms and J at slave positions `xs` (small displacements: as they were at the start). `quaternion(k)`: the rotation
   // number k as SpringEnd::orientation counts.
   template <class Quaternion> void shape(const double* xs, Quaternion quaternion);
-  std::string collapsed() const;  // name of a port whose slaves have come to lie on a line; empty: none
+  std::string findCollapsed() const;  // name of a port whose slaves have come to lie on a line; empty: none
   void distributeLoads(const double* force, const double* moment, double* fs,
                        double* ms) const;  // added to the slaves' loads
   void mapMotion(const double* vs, const double* ws, double* velocity, double* spin) const;

@@ -41,8 +41,8 @@ struct Simulation::Impl {
   std::uint32_t flags = 0;
   bool dampers = false, energy = false, integrates = false;
   // Derived from `data`, never saved: geometry, gathered loads and outputs behind the inputs.
-  bool geometryOld = true, loadsOld = true, outputsOld = true, parametersOld = true;
-  bool portsOld = true;  // the ports' nodes
+  bool geometryDirty = true, loadsDirty = true, outputsDirty = true, parametersDirty = true;
+  bool portsDirty = true;  // the ports' nodes
   bool prepared = false;
 
   explicit Impl(std::shared_ptr<const Model> m)
@@ -90,7 +90,7 @@ struct Simulation::Impl {
     return std::min({asked > 0 ? asked : none, limit, turn});
   }
 
-  void findLimits() {
+  void computeLimits() {
     double* bounds = field(Field::bounds);
     std::fill_n(bounds, layout[Field::bounds].count, 0.0);
     *field(Field::nodalTimeStep) = nodalStep(*model, field(Field::addedMass), field(Field::addedInertia),
@@ -119,29 +119,29 @@ struct Simulation::Impl {
     }
   }
 
-  void bringPorts() {
-    if (portsOld && dynamics.ports.anyDriven()) dynamics.movePorts();
-    portsOld = false;
+  void updatePorts() {
+    if (portsDirty && dynamics.ports.anyDriven()) dynamics.movePorts();
+    portsDirty = false;
   }
 
-  void bringGeometry() {
-    bringPorts();
-    if (!geometryOld) return;
+  void updateGeometry() {
+    updatePorts();
+    if (!geometryDirty) return;
     dynamics.updateGeometry();
     checkSegments();
     if (flags & accelerationsValid) dynamics.updateMass();  // a restored state: nothing else will
-    geometryOld = false;
+    geometryDirty = false;
   }
 
   void evaluate() {
-    bringGeometry();
+    updateGeometry();
     if (model->anyFree() && !(flags & accelerationsValid)) {
       dynamics.evaluate();
       flags |= accelerationsValid;
-    } else if (loadsOld) {
+    } else if (loadsDirty) {
       dynamics.evaluateReactions();
     }
-    loadsOld = false;
+    loadsDirty = false;
     checkPorts(0);
   }
 
@@ -213,13 +213,13 @@ struct Simulation::Impl {
         if (std::abs(from + h * field(rate)[k]) < farAway) continue;  // false for NaN
         throw Diverged(text + ("port '" + model->ports[k / 3].name) + "' leaves the world", layout[rate].offset + k);
       }
-    const std::string flat = dynamics.ports.collapsed();
+    const std::string flat = dynamics.ports.findCollapsed();
     if (!flat.empty()) throw Diverged(text + ("the slaves of port '" + flat) + "' have come to lie on a line");
   }
 
   void checkSegments() {
     if (!model->finite()) return;
-    const std::string nodes = dynamics.collapsed();
+    const std::string nodes = dynamics.findCollapsedSegment();
     if (nodes.empty()) return;
     char text[80];
     std::snprintf(text, sizeof text, "diverged at t = %.9g s: ", time);
@@ -240,13 +240,13 @@ struct Simulation::Impl {
     std::copy_n(backup.begin(), kept[0].count, data.begin() + kept[0].offset);
     std::copy_n(backup.begin() + kept[0].count, kept[1].count, data.begin() + kept[1].offset);
     flags &= ~accelerationsValid;
-    geometryOld = loadsOld = outputsOld = portsOld = true;
+    geometryDirty = loadsDirty = outputsDirty = portsDirty = true;
   }
 
   // All nodes are driven: positions and rotations follow the velocities, and nothing is integrated else.
   void carry(double duration) {
     dynamics.inputs.begin(data.data());
-    bringGeometry();
+    updateGeometry();
     Dynamics::Power before{};
     if (energy) {
       evaluate();
@@ -337,13 +337,13 @@ double Simulation::integratorLimit() const { return impl_->methodLimit(); }
 
 void Simulation::inputsChanged() {
   impl_->flags &= ~accelerationsValid;
-  impl_->loadsOld = impl_->outputsOld = impl_->portsOld = true;
-  impl_->geometryOld = impl_->model->settings.position == Position::input || impl_->geometryOld;
+  impl_->loadsDirty = impl_->outputsDirty = impl_->portsDirty = true;
+  impl_->geometryDirty = impl_->model->settings.position == Position::input || impl_->geometryDirty;
   impl_->dynamics.takeDrivenVelocities();
 }
 
 void Simulation::parametersChanged() {
-  impl_->parametersOld = true;
+  impl_->parametersDirty = true;
   inputsChanged();
 }
 
@@ -405,20 +405,20 @@ void Simulation::reset() {
   s.time = 0;
   s.substeps = 0;
   s.flags = 0;
-  s.geometryOld = s.loadsOld = s.outputsOld = s.parametersOld = s.portsOld = true;
+  s.geometryDirty = s.loadsDirty = s.outputsDirty = s.parametersDirty = s.portsDirty = true;
 }
 
 void Simulation::initialise(double time) {
   Impl& s = *impl_;
   s.time = time;
-  s.bringPorts();
+  s.updatePorts();
   s.dynamics.prepare();
   s.checkSegments();
-  s.findLimits();
+  s.computeLimits();
   s.flags = initialised;
   s.prepared = true;
-  s.geometryOld = s.parametersOld = false;
-  s.loadsOld = s.outputsOld = true;
+  s.geometryDirty = s.parametersDirty = false;
+  s.loadsDirty = s.outputsDirty = true;
   if (s.energy) {
     s.evaluate();
     s.startEnergy();
@@ -442,8 +442,8 @@ void Simulation::step(double duration) {
     else
       s.carry(duration);
     s.dynamics.inputs.clear();
-    s.outputsOld = true;
-    if (!s.model->anyFree()) s.loadsOld = true;
+    s.outputsDirty = true;
+    if (!s.model->anyFree()) s.loadsDirty = true;
   } catch (const SceneError& e) {  // the mass matrix of a geometry that has blown up
     undo();
     throw Diverged("diverged after t = " + std::to_string(time) + " s: " + e.what());
@@ -455,17 +455,17 @@ void Simulation::step(double duration) {
 
 void Simulation::updateOutputs() {
   Impl& s = *impl_;
-  s.bringPorts();
-  if (s.parametersOld) {  // during initialisation parameters may still change
+  s.updatePorts();
+  if (s.parametersDirty) {  // during initialisation parameters may still change
     s.dynamics.prepare();
-    s.findLimits();
+    s.computeLimits();
     s.prepared = true;
-    s.parametersOld = false;
+    s.parametersDirty = false;
   }
-  if (!s.outputsOld) return;
+  if (!s.outputsDirty) return;
   s.evaluate();
   s.dynamics.updateOutputs();
-  s.outputsOld = false;
+  s.outputsDirty = false;
 }
 
 void Simulation::directionalDerivative(double* derivative) {
@@ -495,8 +495,8 @@ void Simulation::restore(const State& state) {
   s.dynamics.inputs.assign(state.inputs, s.layout);
   if (!s.prepared || !sameMasses) s.dynamics.prepareMass();
   s.prepared = true;
-  s.geometryOld = s.loadsOld = s.outputsOld = s.portsOld = true;
-  s.parametersOld = !(s.flags & initialised);
+  s.geometryDirty = s.loadsDirty = s.outputsDirty = s.portsDirty = true;
+  s.parametersDirty = !(s.flags & initialised);
 }
 
 }  // namespace tiefmu

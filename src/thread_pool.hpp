@@ -10,13 +10,13 @@ namespace tiefmu {
 
 // Lives with the simulation that made it: its threads end in the destructor. They wait by spinning for some
 // microseconds, then asleep.
-class Workers {
+class ThreadPool {
  public:
   // The caller is one of `threads`. Throws std::system_error where the system has none left.
-  explicit Workers(int threads);
-  ~Workers();
-  Workers(const Workers&) = delete;
-  Workers& operator=(const Workers&) = delete;
+  explicit ThreadPool(int threads);
+  ~ThreadPool();
+  ThreadPool(const ThreadPool&) = delete;
+  ThreadPool& operator=(const ThreadPool&) = delete;
 
   // body(k) once for each k in [0, count), count < 65536, on whichever thread comes first; returns when all have
   // returned. `body` must not throw.

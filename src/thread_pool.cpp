@@ -1,4 +1,4 @@
-#include "workers.hpp"
+#include "thread_pool.hpp"
 
 namespace tiefmu {
 namespace {
@@ -15,7 +15,7 @@ void pause() {
 
 }  // namespace
 
-Workers::Workers(int threads) {
+ThreadPool::ThreadPool(int threads) {
   threads_.reserve(threads - 1);
   try {
     for (int k = 1; k < threads; ++k) threads_.emplace_back([this] { work(); });
@@ -25,9 +25,9 @@ Workers::Workers(int threads) {
   }
 }
 
-Workers::~Workers() { end(); }
+ThreadPool::~ThreadPool() { end(); }
 
-void Workers::end() {
+void ThreadPool::end() {
   stop_.store(true);
   ticket_.fetch_add(std::uint64_t{1} << 32);
   ticket_.notify_all();
@@ -37,7 +37,7 @@ void Workers::end() {
 
 // Takes and does one piece, if any is left. Only who has taken a piece of a round may read what the round is about:
 // it cannot end before that piece is done.
-bool Workers::takeOne() {
+bool ThreadPool::takeOne() {
   std::uint64_t ticket = ticket_.load(std::memory_order_acquire);
   do {
     if ((ticket & 0xffff) >= (ticket >> 16 & 0xffff)) return false;
@@ -47,7 +47,7 @@ bool Workers::takeOne() {
   return true;
 }
 
-void Workers::work() {
+void ThreadPool::work() {
   for (int idle = 0; !stop_.load(std::memory_order_relaxed);) {
     const std::uint64_t before = ticket_.load(std::memory_order_acquire);
     if (takeOne()) {
@@ -61,7 +61,7 @@ void Workers::work() {
   }
 }
 
-void Workers::run(int count, Call call, const void* body) {
+void ThreadPool::run(int count, Call call, const void* body) {
   call_ = call;
   body_ = body;
   done_.store(0, std::memory_order_relaxed);
