@@ -185,11 +185,6 @@ CASES = {
     "repeated segment": (("mesh", "segments", 1), [1, 1, 2, 3], "mesh: segment 1 is repeated"),
     "repeated slave": (("tie", 0, "slaves"), [101, 101], "tie 'weld': slaves: id 101 is repeated"),
     "repeated tie": (("tie", 1), {"name": "weld", "slaves": [2]}, "tie 'weld': this name is repeated"),
-    "repeated node in a segment": (
-        ("mesh", "segments", 0),
-        [1, 1, 2, 3, 3],
-        "mesh: segment 1: node 3 is repeated; a triangle has three node ids",
-    ),
     # not finite, negative
     "coordinate is nan": (("mesh", "nodes", 0), [1, 0, 0, NAN], "mesh: node 1: z: nan is not a finite number"),
     "coordinate is infinite": (
@@ -680,9 +675,9 @@ MESHES = {
     "missing node": (QUAD[:3] + QUAD[4:], [[1, 1, 2, 3, 4]], {}, f"mesh: segment 1: node 4 {NOT_FOUND}"),
     "node id of a segment is zero": (
         QUAD,
-        [[1, 1, 2, 3, 0]],
+        [[1, 1, 2, 0, 4]],
         {},
-        "mesh: segment 1: node 4: 0 is too small; it must be at least 1",
+        "mesh: segment 1: node 3: 0 is too small; it must be at least 1",
     ),
     "segment id is negative": (
         QUAD,
@@ -759,11 +754,17 @@ def test_chain_of_ties(weld, scene_file, capsys):
 
 
 def test_slaves_are_masters_too(weld, scene_file, capsys):
-    weld["tie"][0]["slaves"] = "all"
+    weld["tie"][0]["slaves"] = [101, 1]
     assert (
         line_of(scene_file, capsys, weld)
         == "tie 'weld': slave 1: is also a master, on segment 1 of tie 'weld'; take it out of one of them"
     )
+
+
+def test_all_slaves_of_a_set_are_masters(weld, scene_file, capsys):
+    del weld["mesh"]["nodes"][-1], weld["node"][-1]
+    weld["tie"][0]["slaves"] = "all"
+    assert line_of(scene_file, capsys, weld) == "tie 'weld': slaves: every node of 'all' is a master of this tie"
 
 
 def test_free_node_that_turns_without_inertia(weld, scene_file, capsys):
@@ -802,7 +803,7 @@ def test_ids_of_a_gmsh_file_that_are_too_large(number, weld, scene_file, tmp_pat
     with pytest.raises(tiefmu.SceneError) as error:
         tiefmu.load(scene_file(weld))
     assert str(error.value) == (
-        f"weld.toml: mesh: file: panel.msh: segment {number}: ids are less than 9223372036854775808"
+        f"weld.toml: mesh: file: panel.msh: {number} is no id; ids are less than 9223372036854775808"
     )
 
 

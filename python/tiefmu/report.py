@@ -37,7 +37,7 @@ def report(scene: Scene) -> dict:
             {"id": number, "tie": scene.ties[tie].name, "reason": reason} for number, tie, reason in found["dropped"]
         ],
         "left_out": found["left_out"].tolist(),
-        "warnings": found["warnings"] + size_warning(sum(variables.values())),
+        "warnings": scene.warnings + found["warnings"] + size_warning(sum(variables.values())),
         "notes": [*scene.notes, *found["notes"]],
         "stable_time_step": scene.start.get("stable_time_step").tolist()[0],
         "nodal_time_step": scene.start.get("nodal_time_step").tolist()[0],

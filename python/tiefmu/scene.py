@@ -14,9 +14,9 @@ import numpy as np
 from . import _core, mesh, schema
 from ._core import SceneError
 from .mesh import properties
+from .mesh.data import listed
 from .mesh.properties import MOTIONS
 from .mesh.properties import NUMBERS as NODE_VALUES
-from .schema import suggestion
 from .units import Units
 
 if sys.version_info >= (3, 11):
@@ -28,16 +28,17 @@ else:
 class Scene:
     """A checked and compiled scene; made by `load`.
 
-    file: how messages call the source; name: of the model, from the file's name; title; notes: remarks of the reading
-    (list of str); ties: the [[tie]] tables in order; settings: the [model] table; rotations: ids of the nodes declared
-    with rotations; model: the compiled `_core.Model`; start: a `_core.Simulation` of it, initialised at time 0.
+    file: how messages call the source; name: of the model, from the file's name; title; notes, warnings: remarks of
+    the reading (lists of str); ties: the [[tie]] tables in order; settings: the [model] table; rotations: ids of the
+    nodes declared with rotations; model: the compiled `_core.Model`; start: a `_core.Simulation` of it, initialised at
+    time 0.
     """
 
     def __init__(self, file: str, name: str, tables: schema.SceneTables, folder: Path):
         self.file, self.name, self.title, self.ties = file, name, tables.title, tables.tie
         self.settings = tables.model
         assembly = Assembly(tables, folder)
-        self.notes = assembly.mesh.notes
+        self.notes, self.warnings = assembly.mesh.notes, assembly.mesh.warnings
         self.rotations = assembly.mesh.node_id[assembly.rotations]
         self.model = _core.Model(assembly.scene())
         self.start = self.simulation()
@@ -127,12 +128,10 @@ class Assembly:
     # which nodes and segments a table means: sorted or as listed, as indices
 
     def nodes(self, where: str, wanted) -> np.ndarray:
-        m = self.mesh
-        return select(where, wanted, "node", m.node_id, m.node_sets, {})
+        return self.mesh.select_nodes(where, wanted)
 
     def segments(self, where: str, wanted) -> np.ndarray:
-        m = self.mesh
-        return select(where, wanted, "segment", m.segment_id, m.segment_sets, m.node_sets)
+        return self.mesh.select_segments(where, wanted)
 
     def apply_properties(self, path: Path, name: str):
         for key, column in properties.read(path, name, self.mesh.node_id).items():
@@ -165,7 +164,14 @@ class Assembly:
                 raise SceneError(f"{where}: this name is repeated")
             names.add(table.name)
             segments = self.segments(f"{where}: segments", table.segments)
+            second = self.mesh.segment_id[segments][self.mesh.second_order[segments]]
+            if len(second):
+                self.mesh.notes.append(
+                    f"{where}: second-order segments, used as the linear ones of their corner nodes: {listed(second)}"
+                )
             slaves = self.nodes(f"{where}: slaves", table.slaves)
+            if not isinstance(table.slaves, list):
+                slaves = self.without_masters(where, table.slaves, slaves, segments)
             fixed = slaves[(self.motion[slaves] == MOTIONS.index("fixed")) & (self.motion_table[slaves] != 0)]
             if len(fixed):
                 table_number = self.motion_table[fixed[0]]
@@ -176,6 +182,18 @@ class Assembly:
                 )
             ties.append((table.name, segments, slaves))
         return ties
+
+    def without_masters(self, where: str, name: str, slaves: np.ndarray, segments: np.ndarray) -> np.ndarray:
+        """The slaves of a set that are no masters of the same tie; a set may be a whole part."""
+        masters = np.isin(slaves, self.mesh.segments[segments])
+        if masters.all():
+            raise SceneError(f"{where}: slaves: every node of '{name}' is a master of this tie")
+        if masters.any():
+            self.mesh.notes.append(
+                f"{where}: nodes of the set of slaves that are masters of this tie, passed over: "
+                f"{listed(self.mesh.node_id[slaves[masters]])}"
+            )
+        return slaves[~masters]
 
     def resolve_springs(self) -> list[tuple[np.ndarray, np.ndarray]]:
         """Ends (a, b) of the springs of each table; b is -1 for ground."""
@@ -290,25 +308,3 @@ class Assembly:
             hide=interface.hide,
         )
         return scene
-
-
-def select(where: str, wanted, what: str, ids: np.ndarray, sets: dict, other_sets: dict) -> np.ndarray:
-    """Indices of the nodes or segments (`what`) that "all", a set's name or a list of ids means."""
-    if isinstance(wanted, list):
-        index = mesh.find(ids, np.array(wanted, np.int64))
-        if (index < 0).any():
-            missing = wanted[int(np.argmax(index < 0))]
-            raise SceneError(f"{where}: {what} {missing} is not in the mesh{mesh.span(ids)}")
-        return index
-    if wanted == "all":
-        if not len(ids):
-            raise SceneError(f"{where}: the mesh has no {what}s")
-        return np.arange(len(ids))
-    if wanted not in sets:
-        if wanted in other_sets:
-            raise SceneError(f"{where}: '{wanted}' is a set of nodes, not of {what}s")
-        known = suggestion(wanted, sets) or f"; it has no sets of {what}s: give ids or 'all'"
-        raise SceneError(f"{where}: the mesh has no set '{wanted}'{known}")
-    if not len(sets[wanted]):
-        raise SceneError(f"{where}: the set '{wanted}' holds no {what}")
-    return sets[wanted]

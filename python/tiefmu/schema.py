@@ -8,7 +8,16 @@ import re
 import sys
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, PlainValidator, ValidationError, model_validator
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    PlainValidator,
+    ValidationError,
+    model_validator,
+)
 from pydantic_core import PydanticCustomError
 
 from ._core import SceneError
@@ -147,6 +156,11 @@ def keyed(key: str, check, value: Any) -> Any:
         raise wrong(f"{key}: {error.message()}") from None
 
 
+def triangle(row: Any) -> Any:
+    """The row of a segment; a fourth node that is 0 is none, as in crash decks."""
+    return row[:4] if isinstance(row, list) and len(row) == 5 and type(row[4]) is int and row[4] == 0 else row
+
+
 def two_nodes(value: Any) -> list[int]:
     if not isinstance(value, list) or len(value) != 2:
         raise wrong(f"expected two node ids, found {found(value)}")
@@ -181,7 +195,7 @@ class Mesh(Table):
     file: Name | None = None
     properties: Name | None = None
     nodes: list[Annotated[tuple[Id, Coordinate, Coordinate, Coordinate], Field(strict=False)]] = []
-    segments: list[Annotated[list[Id], Field(min_length=4, max_length=5)]] = []
+    segments: list[Annotated[list[Id], BeforeValidator(triangle), Field(min_length=4, max_length=5)]] = []
 
 
 class Node(Table):

@@ -1,149 +1,348 @@
-"""Reads what a tie needs from an Abaqus input file: nodes, shell-like elements and sets, with the file's own ids.
+"""Reads what a tie needs from an Abaqus or CalculiX input file: nodes, elements, sets and surfaces, by part.
 
 meshio reads this format too, but it drops the ids, keeps only the last *NODE block, and can put an element set on the
-wrong block of elements - all without a word.
+wrong block of elements - all without a word. Parts are put together in abaqus_assembly.py.
 """
 
 import re
+from dataclasses import dataclass, field
 from pathlib import Path
 
-from .._core import SceneError
-from ..schema import shortened
+import numpy as np
 
-# Three- and four-node elements that are surfaces: shells, membranes, surface, rigid and plane elements. The digit
-# behind the family's name counts the nodes.
-SURFACE = re.compile(r"(STRI|SFM3D|M3D|R3D|CPS|CPEG|CPE|CAX|DS|DC2D|S)(\d)")
+from .._core import SceneError
+from ..schema import found, shortened
+from .data import Block, Sets
+
+# Families of elements and the number of nodes behind their names: shells, membranes, surface, rigid and plane
+# elements; solids, continuum shells, cohesive elements.
+KIND = re.compile(
+    r"(?P<surface>STRI|SFM3D|M3D|R3D|CPS|CPEG|CPE|CAX|AC2D|DC2D|DS|S)(?P<n>\d)|"
+    r"(?:DCC3D|DC3D|AC3D|EC3D|C3D|COH3D|CSS|SC)(?P<m>\d+)"
+)
+SURFACES = {3: "triangle", 6: "triangle", 4: "quad", 8: "quad", 9: "quad"}
+SOLIDS = {4: "tetra", 10: "tetra", 5: "pyramid", 13: "pyramid", 6: "wedge", 15: "wedge"} | dict.fromkeys(
+    (8, 20, 27), "hexahedron"
+)
 # Keywords that make nodes or elements, or move them, without listing them.
-MOST = 10**8  # ids in a generated set
 GENERATORS = {"NGEN", "NFILL", "NCOPY", "NMAP", "ELGEN", "ELCOPY", "SYSTEM"}
+MOST = 10**8  # ids in a generated set
+
+
+@dataclass
+class SetLine:
+    """Part of the definition of a set or surface. members: ids; names: of other sets; `label`: of a surface's faces;
+    elements: of a node set: the names are of element sets, whose nodes are meant."""
+
+    members: np.ndarray
+    names: list[str]
+    label: str = ""
+    instance: str = ""
+    elements: bool = False
+
+
+@dataclass
+class Surface:
+    """lines; of_nodes: TYPE=NODE; combine: how the surfaces that its lines name are combined, or nothing;
+    unknown: a type that is not read."""
+
+    lines: list[SetLine] = field(default_factory=list)
+    of_nodes: bool = False
+    combine: str = ""
+    unknown: str = ""
+
+
+class Part:
+    """What stands between *PART and *END PART, in an instance or in the assembly, or a file without parts."""
+
+    def __init__(self, name: str = ""):
+        self.name = name
+        self.nodes: list[tuple[np.ndarray, np.ndarray]] = []  # ids (n), positions (n, 3)
+        self.blocks: list[Block] = []
+        self.node_sets, self.element_sets, self.surfaces = Sets(True), Sets(True), Sets(True)
+
+    def add(self, sets: Sets, name: str, lines: list[SetLine]):
+        if name not in sets:
+            sets[name] = []
+        sets[name].extend(lines)
+
+
+@dataclass
+class Instance:
+    """A part put into the assembly: own content besides the part's, translation (3), then rotation about the axis
+    from a to b by an angle in degrees (a, b, angle: 7 numbers)."""
+
+    part: str
+    own: Part
+    translation: np.ndarray
+    rotation: np.ndarray | None
 
 
 class InputFile:
-    """nodes: id -> [x, y, z]; segments: id -> node ids (three or four); node_sets: name -> node ids;
-    element_sets: name -> element ids; corners: id -> node ids of every element, whatever its kind."""
+    """root: what is outside parts and instances; parts by name in upper case; instances in order."""
 
     def __init__(self, path: Path):
-        self.nodes, self.segments, self.corners = {}, {}, {}
-        self.node_sets, self.element_sets = {}, {}
-        self._read(path)
-
-    def _read(self, path: Path):
-        keyword, options, block = None, {}, []
-        for line in path.read_text(encoding="utf-8", errors="replace").splitlines():
-            line = line.strip()
-            if not line or line.startswith("**"):
-                continue
-            if line.startswith("*"):
-                self._block(path, keyword, options, block)
+        self.folder = path.parent
+        self.root, self.parts, self.instances = Part(), {}, []
+        self.scope = self.root
+        keyword, options, block = "", {}, []
+        for line in joined(included(path, self.folder, ())):
+            if line[0] == "*":
+                self.block(keyword, options, block)
                 keyword, options = parse_keyword(line)
                 block = []
             else:
                 block.append(line)
-        self._block(path, keyword, options, block)
+        self.block(keyword, options, block)
 
-    def _block(self, path: Path, keyword: str | None, options: dict, lines: list[str]):
+    def block(self, keyword: str, options: dict, lines: list[str]):
         try:
+            if keyword in ("NODE", "ELEMENT", "NSET", "ELSET") and options.get("INPUT"):
+                lines = [*lines, *joined(included(self.folder / options["INPUT"], self.folder, ()))]
             if keyword == "NODE":
-                self._nodes(options, lines)
+                self.read_nodes(options, lines)
             elif keyword == "ELEMENT":
-                self._elements(options, lines)
+                self.read_elements(options, lines)
             elif keyword == "NSET":
-                self._set(self.node_sets, options["NSET"], options, lines)
+                self.read_set(self.scope.node_sets, options["NSET"], options, lines)
             elif keyword == "ELSET":
-                self._set(self.element_sets, options["ELSET"], options, lines)
-            elif keyword == "INCLUDE":
-                self._read(path.parent / options["INPUT"])
-            elif keyword in GENERATORS or (keyword == "INSTANCE" and lines):
+                self.read_set(self.scope.element_sets, options["ELSET"], options, lines)
+            elif keyword == "SURFACE":
+                self.read_surface(options, lines)
+            elif keyword == "PART":
+                self.scope = self.parts[options["NAME"].upper()] = Part(options["NAME"])
+            elif keyword == "INSTANCE":
+                self.read_instance(options, lines)
+            elif keyword in ("END PART", "END INSTANCE"):
+                self.scope = self.root
+            elif keyword in GENERATORS:
                 raise SceneError(f"*{keyword} makes or moves nodes without listing them; write the mesh out in full")
-        except (ValueError, KeyError, IndexError, OSError) as error:
+        except KeyError as error:
+            raise SceneError(f"*{keyword}: parameter {error.args[0]} is missing") from None
+        except (ValueError, IndexError, OverflowError) as error:
             if isinstance(error, SceneError):
                 raise
             raise SceneError(f"*{keyword}: cannot be read ({error})") from None
 
-    def _nodes(self, options: dict, lines: list[str]):
-        ids = []
+    def read_nodes(self, options: dict, lines: list[str]):
+        rows = [line.split(",") for line in lines]
+        ids = whole([row[0] for row in rows])
+        position = np.zeros((len(rows), 3))
+        for k in range(min(3, max((len(row) for row in rows), default=1) - 1)):
+            position[:, k] = numbers([row[k + 1] if len(row) > k + 1 else "" for row in rows])
+        system = options.get("SYSTEM", "R").upper()[:1]
+        if system == "C":
+            r, angle = position[:, 0].copy(), np.radians(position[:, 1])
+            position[:, 0], position[:, 1] = r * np.cos(angle), r * np.sin(angle)
+        elif system == "S":
+            r, theta, phi = position[:, 0].copy(), np.radians(position[:, 1]), np.radians(position[:, 2])
+            position = np.column_stack(
+                [r * np.cos(theta) * np.cos(phi), r * np.sin(theta) * np.cos(phi), r * np.sin(phi)]
+            )
+        elif system != "R":
+            raise SceneError(f"*NODE: SYSTEM = {shortened(options['SYSTEM'])} is none of R, C, S")
+        self.scope.nodes.append((ids, position))
+        if options.get("NSET"):
+            self.scope.add(self.scope.node_sets, options["NSET"], [SetLine(ids, [])])
+
+    def read_elements(self, options: dict, lines: list[str]):
+        match = KIND.match(options["TYPE"].upper())
+        if match is None:
+            shape, count = "other", None
+        elif match["surface"]:
+            count = int(match["n"])
+            shape = SURFACES.get(count, "other")
+        else:
+            count = int(match["m"])
+            shape = SOLIDS.get(count, "other")
+        ids, nodes = records(lines, None if shape == "other" else count, shape == "quad")
+        self.scope.blocks.append(Block(shape, ids, nodes))
+        if options.get("ELSET"):
+            self.scope.add(self.scope.element_sets, options["ELSET"], [SetLine(ids, [])])
+
+    def read_set(self, sets: Sets, name: str, options: dict, lines: list[str]):
+        if not name:
+            raise SceneError("a set has no name")
+        instance = options.get("INSTANCE", "")
+        self.scope.add(sets, name, [])
+        if sets is self.scope.node_sets and options.get("ELSET"):
+            line = SetLine(np.empty(0, np.int64), [options["ELSET"]], instance=instance, elements=True)
+            self.scope.add(sets, name, [line])
+        if "GENERATE" in options:
+            for line in lines:
+                self.scope.add(sets, name, [SetLine(generated(name, line), [], instance=instance)])
+            return
+        items = ",".join(lines).split(",")
+        try:
+            members, names = whole([item for item in items if item.strip()]), []
+        except ValueError:
+            items = [item.strip() for item in items if item.strip()]
+            members = whole([item for item in items if item.isdecimal()])
+            names = [item.strip('"') for item in items if not item.isdecimal()]
+        self.scope.add(sets, name, [SetLine(members, names, instance=instance)])
+
+    def read_surface(self, options: dict, lines: list[str]):
+        name = options["NAME"]
+        surface = self.scope.surfaces[name] if name in self.scope.surfaces else Surface()
+        self.scope.surfaces[name] = surface
+        kind = options.get("TYPE", "ELEMENT").upper()
+        surface.of_nodes = kind == "NODE"
+        surface.combine = options.get("COMBINE", "").upper()
+        if kind not in ("NODE", "ELEMENT"):
+            surface.unknown = kind
+            return
         for line in lines:
-            number, *rest = line.rstrip(",").split(",")
-            position = [float(item) if item.strip() else 0.0 for item in rest[:3]]
-            add(self.nodes, whole(number), position + [0.0] * (3 - len(position)), "node")
-            ids.append(int(number))
-        if "NSET" in options:
-            self.node_sets.setdefault(options["NSET"], []).extend(ids)
+            what, _, label = line.partition(",")
+            what, label = what.strip().strip('"'), label.split(",")[0].strip().upper()
+            if surface.combine:
+                names = [item.strip().strip('"') for item in line.split(",") if item.strip()]
+                surface.lines.append(SetLine(np.empty(0, np.int64), names))
+            elif what.isdecimal():
+                surface.lines.append(SetLine(whole([what]), [], label))
+            elif what:
+                surface.lines.append(SetLine(np.empty(0, np.int64), [what], label))
 
-    def _elements(self, options: dict, lines: list[str]):
-        kind = options["TYPE"].upper()
-        match = SURFACE.match(kind)
-        count = int(match[2]) if match else None
-        if count in (6, 8, 9):
-            raise SceneError(f"element type {kind} is quadratic; segments need three or four nodes")
-        ids = []
-        for number, *nodes in records(lines, count if count in (3, 4) else None):
-            add(self.corners, number, nodes, "element")
-            if count in (3, 4):
-                self.segments[number] = nodes
-            ids.append(number)
-        if "ELSET" in options:
-            self.element_sets.setdefault(options["ELSET"], []).extend(ids)
-
-    @staticmethod
-    def _set(sets: dict, name: str, options: dict, lines: list[str]):
-        members = sets.setdefault(name, [])
-        for line in lines:
-            items = [item.strip() for item in line.split(",") if item.strip()]
-            if "GENERATE" in options:
-                first, last, *step = map(whole, items)
-                if len(step) > 1:
-                    raise SceneError(f"set '{name}': GENERATE takes first, last and step, found '{line}'")
-                if last - first > MOST:
-                    raise SceneError(f"set '{name}': {first} to {last} is more than a file can hold")
-                members.extend(range(first, last + 1, *step))
-                continue
-            for item in items:
-                if item.isdigit():
-                    members.append(whole(item))
-                elif item in sets:
-                    members.extend(sets[item])
-                else:
-                    raise SceneError(f"set '{name}': '{item}' is neither an id nor a set defined before")
+    def read_instance(self, options: dict, lines: list[str]):
+        name = options["NAME"]
+        if "PART" not in options:
+            raise SceneError(
+                f"instance '{name}' comes from another file, which is not read; write the mesh out in full"
+            )
+        values = [numbers(line.rstrip(", ").split(",")) for line in lines]
+        if len(values) > 2 or (values and len(values[0]) > 3) or (len(values) > 1 and len(values[1]) != 7):
+            raise SceneError(f"instance '{name}': expected a translation (3 numbers) and a rotation (7 numbers)")
+        translation = np.zeros(3)
+        if values:
+            translation[: len(values[0])] = values[0]
+        self.scope = Part(name)
+        self.instances.append(
+            Instance(options["PART"], self.scope, translation, values[1] if len(values) > 1 else None)
+        )
 
 
-def parse_keyword(line: str) -> tuple[str, dict]:
+INCLUDE = re.compile(r"\*\s*include\s*,", re.IGNORECASE)
+
+
+def included(path: Path, folder: Path, above: tuple[Path, ...]) -> list[str]:
+    """Lines of the file and of those that it includes, comments and blank lines left out."""
+    try:
+        text = path.read_text(encoding="utf-8", errors="replace")
+    except OSError as error:
+        if not above:
+            raise
+        raise SceneError(f"*INCLUDE: {path}: {error.strerror}") from None
+    lines = [line.strip() for line in text.splitlines()]
+    lines = [line for line in lines if line and line[:2] != "**"]
+    if not INCLUDE.search(text):
+        return lines
+    flat = []
+    for line in joined(lines):
+        if line[0] == "*" and INCLUDE.match(line):
+            name = parse_keyword(line)[1].get("INPUT", "")
+            inner = path.parent / name
+            if not inner.is_file():
+                inner = folder / name  # as a path in Abaqus is one from the folder of the job
+            if inner.resolve() in (*above, path.resolve()):
+                raise SceneError(f"*INCLUDE: {name} includes itself")
+            flat += included(inner, folder, (*above, path.resolve()))
+        else:
+            flat.append(line)
+    return flat
+
+
+def joined(lines: list[str]) -> list[str]:
+    """The same with keyword lines that end with a comma and the lines that go on with them made one."""
+    if not any(line[0] == "*" and line[-1] == "," for line in lines):
+        return lines
+    whole_lines = []
+    for line in lines:
+        before = whole_lines[-1] if whole_lines else ""
+        if before[:1] == "*" and before[-1] == "," and line[0] != "*":
+            whole_lines[-1] += line
+        else:
+            whole_lines.append(line)
+    return whole_lines
+
+
+def parse_keyword(line: str) -> tuple[str, dict[str, str]]:
     """ "*Element, type=S4R" -> ("ELEMENT", {"TYPE": "S4R"}); names of sets keep their case."""
     keyword, *rest = line[1:].split(",")
     options = {}
     for item in rest:
         key, _, value = item.partition("=")
-        options[key.strip().upper()] = value.strip().strip('"')
-    return keyword.strip().upper(), options
+        options[" ".join(key.upper().split())] = value.strip().strip('"')
+    return " ".join(keyword.upper().split()), options
 
 
-def whole(text: str) -> int:
-    """An id, or the step between ids."""
-    number = int(text)
-    if not 1 <= number < 2**63:
-        raise SceneError(f"{shortened(text.strip())} is no id; ids are whole numbers from 1")
-    return number
+def whole(items: list[str]) -> np.ndarray:
+    """Ids, or steps between ids; ValueError for what is no number."""
+    values = list(map(int, items))
+    bad = next((value for value in values if not 1 <= value < 2**63), None) if values else None
+    if bad is not None:
+        raise SceneError(f"{shortened(str(bad))} is no id; ids are whole numbers from 1")
+    return np.array(values, np.int64)
 
 
-def records(lines: list[str], count: int | None):
-    """Element records [id, nodes...]: of `count` nodes, or (None) continued where a line ends with a comma."""
-    record = []
+def numbers(items: list[str]) -> np.ndarray:
+    """Numbers as Fortran writes them (1.D0); blank: 0."""
+    try:
+        return np.array(list(map(float, items)))
+    except ValueError:
+        return np.array([float(re.sub("[dD]", "e", item)) if item.strip() else 0.0 for item in items])
 
-    def checked():
-        if count and len(record) != count + 1:
-            raise SceneError(f"element {record[0]} has {len(record) - 1} nodes, its type has {count}")
-        return record
 
-    for line in lines:
-        record += [whole(item) for item in line.split(",") if item.strip()]
-        if len(record) > count if count else not line.endswith(","):
-            yield checked()
+def generated(name: str, line: str) -> np.ndarray:
+    first, last, *step = whole([item for item in line.split(",") if item.strip()]).tolist()
+    if len(step) > 1:
+        raise SceneError(f"set '{name}': GENERATE takes first, last and step, found {found(line)}")
+    if last - first > MOST:
+        raise SceneError(f"set '{name}': {first} to {last} is more than a file can hold")
+    return np.arange(first, last + 1, *step, dtype=np.int64)
+
+
+def records(lines: list[str], count: int | None, quads: bool) -> tuple[np.ndarray, np.ndarray]:
+    """Element records: ids (n), node ids (n, k), 0 where a record has fewer. A record of `count` nodes goes on over
+    lines until it has them, of unknown count while lines end with a comma; one of three nodes for a quad ends where
+    its line does."""
+    rows = [line.split(",") for line in lines]
+    if count is None or any(len(row) != count + 1 or not row[-1] for row in rows):
+        rows = irregular(rows, count, quads)
+    if not rows:
+        return np.empty(0, np.int64), np.empty((0, count or 1), np.int64)
+    width = max(map(len, rows))
+    columns = [[row[k] if len(row) > k else "0" for row in rows] for k in range(width)]
+    ids = whole(columns[0])
+    nodes = np.zeros((len(rows), width - 1), np.int64)
+    for k, column in enumerate(columns[1:]):
+        nodes[:, k] = [int(item) for item in column]
+    if nodes.min(initial=0) < 0:
+        raise SceneError(f"{nodes.min()} is no id; ids are whole numbers from 1")
+    return ids, nodes
+
+
+def irregular(rows: list[list[str]], count: int | None, quads: bool) -> list[list[str]]:
+    """Rows of lines put together to records, see above."""
+    together, record = [], []
+
+    def close():
+        have = len(record) - 1
+        if count and have != count and not (quads and count == 4 and have == 3):
+            raise SceneError(f"element {shortened(record[0].strip())} has {have} nodes, its type has {count}")
+        together.append(record)
+
+    for row in rows:
+        items = [item for item in row if item.strip()]
+        goes_on = not row[-1].strip()
+        if record and quads and count == 4 and len(record) == 4 and len(items) != 1:  # "5, 1, 2, 3," and no fourth
+            close()
+            record = []
+        record = record + items
+        if not record:
+            continue
+        full = len(record) > count if count else not goes_on
+        if full or (quads and count == 4 and len(record) == 4 and not goes_on):
+            close()
             record = []
     if record:
-        yield checked()
-
-
-def add(table: dict, number: int, value, what: str):
-    if number in table:
-        raise SceneError(f"{what} {number} is repeated")
-    table[number] = value
+        close()
+    return together

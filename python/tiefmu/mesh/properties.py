@@ -15,7 +15,7 @@ import numpy as np
 
 from .._core import SceneError
 from ..schema import LARGEST, found, shortened, suggestion
-from . import find, span
+from .data import find, span
 
 NUMBERS = ("mass", "inertia", "stiffness", "rotational_stiffness")
 MOTIONS = ("driven", "free", "fixed")  # as enum class Motion in src/scene.hpp
