@@ -3,8 +3,11 @@
 import re
 import subprocess
 from pathlib import Path
+from typing import get_args
 
 import pytest
+import tiefmu
+from tiefmu.schema import TABLES
 
 ROOT = Path(__file__).resolve().parents[1]
 TEXT = {".cpp", ".hpp", ".ipp", ".py", ".pyi", ".md", ".toml", ".txt", ".yaml", ""}
@@ -95,3 +98,56 @@ def test_links_lead_somewhere(page):
         target = (ROOT / page).parent / path if path else ROOT / page
         assert target.exists(), link
         assert not anchor or anchor in anchors(target), link
+
+
+INTERFACE = (ROOT / "docs/interface.md").read_text()
+
+
+def test_the_interface_page_names_every_key_of_a_scene():
+    for table, model in TABLES.items():
+        assert f"`[{table}]`" in INTERFACE or f"`[[{table}]]`" in INTERFACE or f"`{table}`" in INTERFACE, table
+        for key, field in model.model_fields.items():
+            if table == "units":
+                continue
+            assert re.search(rf"`{key}`|`{key}[ =:]", INTERFACE), f"{table}.{key}"
+            for value in get_args(field.annotation):
+                if isinstance(value, str):
+                    assert f'`"{value}"`' in INTERFACE, f"{table}.{key} = {value}"
+
+
+def every_variable() -> set[str]:
+    """Names without numbers and components, of scenes that show all there are."""
+    nodes = [[1, 0, 0, 0], [2, 1, 0, 0], [3, 1, 1, 0], [4, 0, 1, 0], [5, 0.3, 0.4, 0.2], [6, 0.3, 0.4, 1.2]]
+    extras = ["slave.r", "slave.a", "master.r", "point.r", "energy", "power_residual", "drift", "master.stiffness"]
+    found = set()
+    for motion, ports in (("free", []), ("driven", []), ("driven", ["masters", "slaves"])):
+        scene = {
+            "mesh": {"nodes": nodes, "segments": [[1, 1, 2, 3, 4]]},
+            "node": [
+                {"nodes": "all", "motion": motion, "rotations": True, "mass": 1.0, "inertia": 1.0},
+                {"nodes": [6], "motion": "free"},
+            ],
+            "tie": [{"segments": "all", "slaves": [5]}],
+            "spring": [{"nodes": [5, 6], "kind": "bushing", "stiffness": 1.0, "rotational_stiffness": 1.0}],
+            "model": {"inertia": "consistent", "reaction": "split"},
+            "integrator": {"threads": 1},
+            "interface": {"expose": [*extras, "slave.mass", "slave.inertia", *(["port.r"] if ports else [])]},
+        }
+        if ports:
+            members = {"masters": [1, 2, 3, 4], "slaves": [5]}
+            scene["interface"]["ports"] = [{"name": name, "nodes": members[name]} for name in ports]
+        found |= set(tiefmu.report(tiefmu.load(scene))["variables"])
+    return found
+
+
+def test_the_interface_page_names_every_variable():
+    documented = set()
+    for line in INTERFACE.splitlines():
+        prefix = ""
+        for name in re.findall(r"`([^`]+)`", line):
+            name = re.sub(r"\[\w+\]", "", name)
+            prefix = name.split(".")[0] if not name.startswith(".") else prefix
+            documented.add(prefix + name if name.startswith(".") else name)
+    found = every_variable()
+    assert len(found) > 40
+    assert found <= documented
