@@ -5,6 +5,8 @@ import sys
 
 import pytest
 
+pytest_plugins = ["fmu_scenes"]  # its fixtures
+
 
 @pytest.fixture
 def weld() -> dict:

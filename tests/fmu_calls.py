@@ -139,3 +139,9 @@ def set_derivatives(instance, names, orders, values) -> int:
         (c_int * n)(*orders),
         (c_double * n)(*values),
     )
+
+
+def diverged(loose) -> Instance:
+    instance = Instance(loose).start(values={"slave[1].f[1]": 1e30})
+    assert instance.step(0, 1.0) == ERROR
+    return instance

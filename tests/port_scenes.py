@@ -109,3 +109,25 @@ def vector(simulation, name: str, value=None):
 
 def exponential(turn) -> np.ndarray:
     return Rotation.from_rotvec(turn).as_matrix()
+
+
+def line_of_slaves(turning: bool, at=None, nodes=(101, 102, 103)) -> dict:
+    """Three slaves on a line along x over a quad, each alone free to be turned by its masters."""
+    port = {"name": "rod", "nodes": list(nodes)} | ({"at": at} if at else {})
+    return {
+        "mesh": {
+            "nodes": [
+                [1, 0, 0, 0],
+                [2, 3, 0, 0],
+                [3, 3, 1, 0],
+                [4, 0, 1, 0],
+                [101, 0.5, 0.5, 0.2],
+                [102, 1.1, 0.5, 0.2],
+                [103, 2.4, 0.5, 0.2],
+            ],
+            "segments": [[1, 1, 2, 3, 4]],
+        },
+        "node": [{"nodes": "all", "rotations": turning, "mass": 1.0}],
+        "tie": [{"name": "tie", "slaves": [101, 102, 103], "search_distance": 1.0}],
+        "interface": {"ports": [port], "expose": ["slave.r", "port.r", "power_residual"]},
+    }

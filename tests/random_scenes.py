@@ -1,7 +1,7 @@
 """Random segments, scenes and motions for the tests. Every scene is the dict of a TOML file, in SI."""
 
 import numpy as np
-from independent import local_coordinates, shape, shape_gradient
+from independent_kernels import local_coordinates, shape, shape_gradient
 
 
 def rotation(rng):
@@ -138,8 +138,13 @@ def structure(rng, formulation="default", rotations=True, inertia="consistent", 
 
 def moved(scene, turn, shift):
     """The same scene turned and shifted in space (isotropic springs only)."""
-    vector = lambda v: (turn @ np.asarray(v, float)).tolist()
-    place = lambda row: [row[0], *(turn @ np.array(row[1:]) + shift).tolist()]
+
+    def vector(v):
+        return (turn @ np.asarray(v, float)).tolist()
+
+    def place(row):
+        return [row[0], *(turn @ np.array(row[1:]) + shift).tolist()]
+
     model = dict(scene["model"])
     if "gravity" in model:
         model["gravity"] = vector(model["gravity"])
@@ -150,7 +155,10 @@ def moved(scene, turn, shift):
 
 def renumbered(scene, new):
     """The same scene with node ids i -> new[i], tables in another order."""
-    ids = lambda which: which if which == "all" else [new[i] for i in which]
+
+    def ids(which):
+        return which if which == "all" else [new[i] for i in which]
+
     mesh = {
         "nodes": [[new[row[0]], *row[1:]] for row in scene["mesh"]["nodes"]][::-1],
         "segments": [[row[0], *(new[i] for i in row[1:])] for row in scene["mesh"]["segments"]][::-1],

@@ -1,5 +1,6 @@
 """`tiefmu advise` on every example scene: what it says is run from the scene it wrote, and its error found anew."""
 
+import itertools
 from pathlib import Path
 
 import numpy as np
@@ -67,7 +68,7 @@ def slave_velocities(scene, given, edges):
     simulation = scene.simulation()
     simulation.initialise(0.0)
     result = []
-    for a, b in zip(edges[:-1], edges[1:]):
+    for a, b in itertools.pairwise(edges):
         if given.names:
             simulation.set_values(given.names, given.mean(a, b))
         simulation.step(b - a)

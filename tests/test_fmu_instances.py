@@ -1,12 +1,13 @@
 """Several instances, saved states, messages, and FMPy: what an FMU does over a run."""
 
+import itertools
 from ctypes import byref, c_char_p, c_size_t, c_void_p
 
 import fmpy
 import numpy as np
 import pytest
 from fmu_calls import ERROR, OK, Fmu, Instance
-from fmu_scenes import any_fmu, fmu, random_values  # noqa: F401 (fixtures)
+from fmu_scenes import random_values
 
 # ----------------------------------------------------------------------------------- saved states, instances and reset
 
@@ -197,7 +198,7 @@ def test_fmpy_simulates_it_as_the_calls_do(any_fmu, irregular):
     times = np.concatenate([[0], np.cumsum(rng.choice([1, 2, 5], 40))]) * 1e-3 if irregular else np.arange(41) * 5e-3
     instance = Instance(any_fmu).start(values=start)
     rows = [instance.get(names)]
-    for a, b in zip(times[:-1], times[1:]):
+    for a, b in itertools.pairwise(times):
         assert instance.step(a, b - a) == OK
         rows.append(instance.get(names))
     if irregular:
@@ -214,7 +215,7 @@ def test_fmpy_simulates_it_as_the_calls_do(any_fmu, irregular):
         slave.exitInitializationMode()
         references = [any_fmu.reference[name] for name in names]
         result.append(slave.getReal(references))
-        for a, b in zip(times[:-1], times[1:]):
+        for a, b in itertools.pairwise(times):
             slave.doStep(currentCommunicationPoint=a, communicationStepSize=b - a)
             result.append(slave.getReal(references))
         slave.terminate()

@@ -11,16 +11,15 @@ import numpy as np
 import pytest
 import tiefmu
 from fmu_calls import ERROR, OK, Fmu, Instance
-from fmu_scenes import fmu  # noqa: F401
 
 
 @pytest.fixture
-def resources(fmu, tmp_path) -> Path:  # noqa: F811
+def resources(fmu, tmp_path) -> Path:
     """A copy of the resource folder."""
     return Path(shutil.copytree(fmu.folder / "resources", tmp_path / "resources"))
 
 
-def refused(fmu, folder: Path) -> str:  # noqa: F811
+def refused(fmu, folder: Path) -> str:
     instance = Instance(fmu, location=folder.as_uri())
     assert instance.component is None
     assert [message[2:5] for message in instance.log] == [(ERROR, "logStatusError", "%s")]
@@ -28,7 +27,7 @@ def refused(fmu, folder: Path) -> str:  # noqa: F811
     return instance.log[0][5]
 
 
-def test_missing_folder(fmu, tmp_path):  # noqa: F811
+def test_missing_folder(fmu, tmp_path):
     assert refused(fmu, tmp_path / "nowhere") == f"fmi2Instantiate: cannot read '{tmp_path / 'nowhere' / 'scene.bin'}'"
 
 
@@ -42,31 +41,31 @@ def test_missing_folder(fmu, tmp_path):  # noqa: F811
         (-1, " bytes instead of "),
     ],
 )
-def test_truncated_resource(fmu, resources, length, why):  # noqa: F811
+def test_truncated_resource(fmu, resources, length, why):
     data = (resources / "scene.bin").read_bytes()
     (resources / "scene.bin").write_bytes(data[:length])
     assert why in refused(fmu, resources)
 
 
-def test_swapped_resource(fmu, weld, tmp_path):  # noqa: F811
+def test_swapped_resource(fmu, weld, tmp_path):
     other = Fmu(weld, tmp_path)
     message = refused(fmu, other.folder / "resources")
     assert fmu.description.guid in message and other.description.guid in message
     assert Instance(fmu, guid=other.description.guid).component is None
 
 
-def test_another_file_in_place_of_the_resource(fmu, resources):  # noqa: F811
+def test_another_file_in_place_of_the_resource(fmu, resources):
     (resources / "scene.bin").write_bytes(fmu.path.read_bytes())
     assert refused(fmu, resources).endswith("not a scene of tiefmu")
 
 
-def test_a_folder_in_place_of_the_resource(fmu, resources):  # noqa: F811
+def test_a_folder_in_place_of_the_resource(fmu, resources):
     (resources / "scene.bin").unlink()
     (resources / "scene.bin").mkdir()
     refused(fmu, resources)
 
 
-def test_what_an_instance_does_not_read_may_be_missing(fmu, resources):  # noqa: F811
+def test_what_an_instance_does_not_read_may_be_missing(fmu, resources):
     for file in resources.iterdir():
         if file.name != "scene.bin":
             file.unlink()
@@ -99,7 +98,7 @@ for path in [fmu.folder, *fmu.folder.rglob("*")]:
 
 
 @pytest.mark.parametrize("where", ["deleted", "read-only"])
-def test_current_folder_deleted_or_nothing_to_write_to(fmu, where, tmp_path):  # noqa: F811
+def test_current_folder_deleted_or_nothing_to_write_to(fmu, where, tmp_path):
     done = subprocess.run(
         [sys.executable, "-c", RUN, str(Path(__file__).parent), str(fmu.path), where],
         cwd=tmp_path,

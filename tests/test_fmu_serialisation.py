@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from fmu_calls import ERROR, OK, Fmu, Instance, set_derivatives
-from fmu_scenes import MIXED, any_fmu, random_values, scene  # noqa: F401
+from fmu_scenes import MIXED, random_values, scene
 
 MAGIC = b"tiefmu state\n"
 HEADER = len(MAGIC) + 4 + 8 + 8
@@ -39,7 +39,7 @@ def run(instance, time, steps, rng):
     return np.array(rows)
 
 
-def test_a_state_continues_with_the_same_bits(any_fmu):  # noqa: F811
+def test_a_state_continues_with_the_same_bits(any_fmu):
     one = Instance(any_fmu).start(time=1.0)
     run(one, 1.0, 3, np.random.default_rng(1))
     state = one.save()
@@ -72,7 +72,7 @@ np.save("rows.npy", run(instance, 0.03, 3, np.random.default_rng(4)))
 """
 
 
-def test_another_process_continues_with_the_same_bits(any_fmu, tmp_path):  # noqa: F811
+def test_another_process_continues_with_the_same_bits(any_fmu, tmp_path):
     instance = Instance(any_fmu).start()
     run(instance, 0.0, 3, np.random.default_rng(3))
     (tmp_path / "state.bin").write_bytes(serialised(instance, instance.save()))
@@ -84,7 +84,7 @@ def test_another_process_continues_with_the_same_bits(any_fmu, tmp_path):  # noq
 
 
 @pytest.mark.parametrize("stage", ["instantiated", "initializationMode", "stepComplete", "terminated"])
-def test_every_stage_comes_back(any_fmu, stage):  # noqa: F811
+def test_every_stage_comes_back(any_fmu, stage):
     """Stage, stop time, parameters and inputs; then the same calls give the same bits."""
     rng = np.random.default_rng(5)
     values = random_values(any_fmu, rng, any_fmu.names("input") + any_fmu.names("parameter"))
@@ -116,7 +116,7 @@ def test_every_stage_comes_back(any_fmu, stage):  # noqa: F811
     one.free(), other.free()
 
 
-def test_inputs_that_move_travel_along(any_fmu):  # noqa: F811
+def test_inputs_that_move_travel_along(any_fmu):
     inputs, outputs = any_fmu.names("input"), any_fmu.names("output")
     one, other = Instance(any_fmu).start(), Instance(any_fmu)
     assert (
@@ -133,7 +133,7 @@ def test_inputs_that_move_travel_along(any_fmu):  # noqa: F811
     one.free(), other.free()
 
 
-def test_a_known_state_is_overwritten_and_any_other_pointer_replaced(any_fmu):  # noqa: F811
+def test_a_known_state_is_overwritten_and_any_other_pointer_replaced(any_fmu):
     instance = Instance(any_fmu).start()
     first = instance.save()
     data = serialised(instance, first)

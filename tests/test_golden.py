@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 import tiefmu
 from in_process import Run
-from independent import Problem, Spring, exponential, quaternion_product
+from independent import Problem
+from independent_kernels import Spring, exponential, quaternion_product
 
 GOLDEN = Path(__file__).resolve().parent / "golden"
 KERNELS = ["a_spot0_translation", "b_spot0_rotation", "c_spot1", "d_triangles"]
@@ -20,7 +21,7 @@ KERNELS = ["a_spot0_translation", "b_spot0_rotation", "c_spot1", "d_triangles"]
 def run_scene(formulation, z, rotations):
     corners = [[1, 0, 0, 0], [2, 1, 0, 0], [3, 1, 1, 0], [4, 0, 1, 0]]
     return {
-        "mesh": {"nodes": corners + [[5, 0.7, 0.4, z]], "segments": [[1, 1, 2, 3, 4]]},
+        "mesh": {"nodes": [*corners, [5, 0.7, 0.4, z]], "segments": [[1, 1, 2, 3, 4]]},
         "node": [{"nodes": "all", "motion": "free", "rotations": rotations}],
         "tie": [{"name": "tie", "segments": "all", "slaves": [5], "formulation": formulation}],
         "spring": [],
@@ -112,7 +113,10 @@ class SummingSpring(Spring):
 def march(problem, inputs, h, steps):
     """Central difference from rest, the first kick a half; the slave of a default tie. Displacements of all steps."""
     x, v, w, qn, qs, _ = problem.unpack(problem.start())
-    turn = lambda q, w: quaternion_product(exponential(h * w), q)
+
+    def turn(q, w):
+        return quaternion_product(exponential(h * w), q)
+
     slave, kick, u = problem.slaves[0], h / 2, []
     for k in range(steps + 1):
         now = problem.evaluate(k * h, np.concatenate([part.ravel() for part in (x, v, w, qn, qs)]), inputs)
@@ -173,7 +177,10 @@ class OneSlave:
             flat = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]] if n == 4 else [[0, 0], [1, 0], [0, 1]], float)
             corners = 0.01 * flat @ np.array([a, b])
             slave = phi @ corners + d
-        pick = lambda key: np.array(case[key])[self.corners + [self.node]]
+
+        def pick(key):
+            return np.array(case[key])[[*self.corners, self.node]]
+
         self.rotations = bool(case["rotational_dof"] and np.any(pick("inertia")[:n]) and not optimized)
         turns = optimized or self.rotations
         node = [{"nodes": "all", "rotations": self.rotations}]

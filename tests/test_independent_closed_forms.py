@@ -12,7 +12,7 @@ UNIT = [[1, 0, 0, 0], [2, 1, 0, 0], [3, 1, 1, 0], [4, 0, 1, 0]]
 
 def quad(corners, slave, **tie):
     return {
-        "mesh": {"nodes": corners + [[5, *slave]], "segments": [[1, 1, 2, 3, 4]]},
+        "mesh": {"nodes": [*corners, [5, *slave]], "segments": [[1, 1, 2, 3, 4]]},
         "node": [{"nodes": "all", "mass": 1.0}],
         "tie": [{"name": "tie", "segments": "all", "slaves": [5], "search_distance": 10.0} | tie],
     }

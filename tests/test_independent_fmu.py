@@ -6,7 +6,7 @@ import pytest
 import tiefmu
 from fmpy.fmi2 import FMU2Slave
 from in_process import EXPOSED, Run
-from independent import Problem
+from independent import Problem, constant
 from random_scenes import structure
 
 END = 0.4
@@ -67,7 +67,7 @@ def test_fmu(tmp_path, formulation, rotations, method):
             assert np.array_equal(instance[name], run[name]), name
 
     problem = Problem(scene)
-    forces = {("f", i): lambda t, load=np.array(load): load for i, load in loads.items()}
+    forces = constant({("f", i): load for i, load in loads.items()})
     expected = problem.solve([0.0, END], forces)[-1]
     tolerance = {"central-difference": 2e-2, "rk4": 2e-4}[method] * np.abs(expected["x"] - problem.x0).max()
     for k, i in enumerate(problem.ids):

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from independent import clamp, default_bias, default_map, lumped, optimized_bias, optimized_map, project, shape
+from independent_kernels import clamp, default_bias, default_map, lumped, optimized_bias, optimized_map, project, shape
 from random_scenes import segment, slave_over
 from tiefmu._core import kernels
 

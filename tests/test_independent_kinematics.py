@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 import tiefmu
 from in_process import Run
-from independent import Problem, clamp, mean_inertia, smallest_lambda
+from independent import Problem
+from independent_kernels import clamp, mean_inertia, smallest_lambda
 from random_scenes import one_segment
 
 CASES = [

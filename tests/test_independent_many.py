@@ -1,4 +1,4 @@
-"""Consistent inertia of more nodes than a factor at every geometry is made for: the iteration against a dense solution."""
+"""Consistent inertia of more nodes than are factored at every geometry: the iteration against a dense solution."""
 
 import numpy as np
 import pytest

@@ -5,18 +5,13 @@ from functools import cache
 import numpy as np
 import pytest
 from in_process import Run
-from independent import Problem
+from independent import Problem, constant
 from random_scenes import structure
 from scipy.integrate import simpson
 
 END = 0.4
 FORMS = [("default", True), ("default", False), ("optimized", False), ("optimized", True)]
 forms = pytest.mark.parametrize("formulation, rotations", FORMS)
-
-
-def constant(inputs):
-    return {key: (lambda t, value=np.array(value): value) for key, value in inputs.items()}
-
 
 LOADS = {("f", 101): [3.0, -2.0, 5.0], ("f", 2): [0.0, 1.0, 2.0], ("f", 301): [1.0, 1.0, 0.0]}
 
@@ -66,17 +61,20 @@ def case(kind, formulation, rotations, inertia, geometry="finite"):
     return scene, inputs, problem, problem.solve([0.0, END], constant(inputs))
 
 
+def energy(program) -> float:
+    return program["energy.kinetic"] + program["energy.strain"]
+
+
 def run(scene, inputs, method, steps):
     """Run at END, and the largest |H - H(0)| of the mechanical energy on the way."""
     name = {"f": lambda i: "f" if 100 < i < 300 else "f_ext", "t": lambda i: "t" if 100 < i < 300 else "t_ext"}
     program = Run(scene | {"integrator": {"method": method}})
     for (kind, i), value in inputs.items():
         program.set_of(i, name[kind](i) if kind in name else kind, value)
-    energy = lambda: program["energy.kinetic"] + program["energy.strain"]
-    start, change = energy(), 0.0
+    start, change = energy(program), 0.0
     for _ in range(steps):
         program.step(END / steps)
-        change = max(change, abs(energy() - start))
+        change = max(change, abs(energy(program) - start))
     return program, change
 
 
@@ -195,10 +193,9 @@ def test_true_energy_drifts_with_lumped_inertia_only(formulation):
     drift = {}
     for inertia in ("lumped", "consistent"):
         program = Run(scene | {"model": {"inertia": inertia}})
-        energy = lambda: program["energy.kinetic"] + program["energy.strain"]
-        start, drift[inertia] = energy(), 0.0
+        start, drift[inertia] = energy(program), 0.0
         for _ in range(500):
             program.step(0.002)
-            drift[inertia] = max(drift[inertia], abs(energy() / start - 1))
+            drift[inertia] = max(drift[inertia], abs(energy(program) / start - 1))
     assert 0.01 < drift["lumped"] < 0.5
     assert drift["consistent"] < 1e-8

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import tiefmu
-from independent import default_search_distance, find
+from independent_kernels import default_search_distance, find
 from random_scenes import patch, rows
 
 

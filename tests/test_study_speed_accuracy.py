@@ -1,6 +1,7 @@
 """The study of speed against accuracy: its CSV, its orders of convergence, its reference against SciPy."""
 
 import csv
+import itertools
 import re
 from dataclasses import asdict
 from pathlib import Path
@@ -198,23 +199,24 @@ def test_reference_of_a_driven_scene_is_its_inverse_dynamics(folder, driven):
     def spin(t):
         return sum(p * signals.at((i, "w"), t) for p, i in zip(phi, (1, 2, 3, 4)))
 
+    def slope(kind, t):
+        """Of the interval that ends at t."""
+        return sum(
+            p * (signals.at((i, kind), t) - signals.at((i, kind), t - 1e-6)) / 1e-6 for p, i in zip(phi, (1, 2, 3, 4))
+        )
+
     d, last = d0, 0.0
     rows = signals.time
     for sample, t in enumerate(np.linspace(0, 0.5, 41)[1:]):
         knots = np.concatenate([[last], rows[(rows > last + 1e-9) & (rows < t - 1e-9)], [t]])
-        for a, b in zip(knots[:-1], knots[1:]):  # smooth between the kinks of the input
-            d = solve_ivp(lambda s, x: np.cross(spin(s), x), (a, b), d, method="DOP853", rtol=1e-13, atol=1e-16).y[
-                :, -1
-            ]
+        for a, b in itertools.pairwise(knots):  # smooth between the kinks of the input
+            turned = solve_ivp(lambda s, x: np.cross(spin(s), x), (a, b), d, method="DOP853", rtol=1e-13, atol=1e-16)
+            d = turned.y[:, -1]
         last = t
         w = spin(t)
         v = sum(p * signals.at((i, "v"), t) for p, i in zip(phi, (1, 2, 3, 4)))
         assert ours.v[sample, 0] == pytest.approx(v + np.cross(w, d), abs=1e-10)
-        before = t - 1e-6  # slopes of the interval that ends here
-        slope = lambda kind: sum(
-            p * (signals.at((i, kind), t) - signals.at((i, kind), before)) / 1e-6 for p, i in zip(phi, (1, 2, 3, 4))
-        )
-        a_s = slope("v") + np.cross(slope("w"), d) + np.cross(w, np.cross(w, d))
+        a_s = slope("v", t) + np.cross(slope("w", t), d) + np.cross(w, np.cross(w, d))
         load = signals.at((101, "f"), t) - 0.7 * (a_s - [0, 0, -9.81])
         assert ours.f[sample] == pytest.approx(np.outer(phi, load), abs=1e-6)
 

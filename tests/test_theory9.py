@@ -5,7 +5,8 @@ import pytest
 import tiefmu
 from fmu_calls import ERROR, OK, Fmu, Instance
 from in_process import Run
-from independent import Problem, no_area, smallest_lambda
+from independent import Problem
+from independent_kernels import no_area, smallest_lambda
 from random_scenes import rotation, rows
 
 QUAD = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
@@ -74,7 +75,7 @@ def test_a_turned_segment_is_the_same_segment(inertia):
 
 def rivet_outside():
     """A bushing between slaves that lie outside their segments."""
-    lower, upper = QUAD, QUAD + [0, 0, 1]
+    lower, upper = QUAD, [*QUAD, 0, 0, 1]
     return {
         "mesh": {
             "nodes": rows(1, lower) + rows(11, upper) + [[5, 1.2, 1.2, 0.3], [15, 1.2, 1.2, 0.8]],
@@ -144,7 +145,7 @@ def test_segment_of_zero_area_never_wins():
     corners = np.vstack([QUAD, [0.3, 0.6, 0.39]])  # the slave sits on a segment of no area
     scene = one_quad(slave=(0.3, 0.6, 0.4))
     scene["mesh"] = {
-        "nodes": rows(1, QUAD) + [[5, 0.3, 0.6, 0.4], [6, 0.3, 0.6, 0.4], [7, 0.4, 0.6, 0.4], [8, 0.5, 0.6, 0.4]],
+        "nodes": [*rows(1, QUAD), [5, 0.3, 0.6, 0.4], [6, 0.3, 0.6, 0.4], [7, 0.4, 0.6, 0.4], [8, 0.5, 0.6, 0.4]],
         "segments": [[1, 1, 2, 3, 4], [9, 6, 7, 8]],
     }
     assert no_area(np.array([[0.3, 0.6, 0.4], [0.4, 0.6, 0.4], [0.5, 0.6, 0.4]])) and not no_area(corners[:4])

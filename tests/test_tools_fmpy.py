@@ -1,5 +1,6 @@
 """FMPy: validation, every option of simulate_fmu, and its cross-check against reference results."""
 
+import itertools
 import re
 import shutil
 import sys
@@ -174,7 +175,7 @@ def test_a_state_to_start_from(case, expected):
 def test_input_derivatives(case):
     """FMPy gives the slope of the interval before, and has room for nine inputs."""
     inputs = {name: values[:STEPS] for name, values in list(case["inputs"]["tie"].items())[:9]}
-    slopes = {name: [0.0] + [(b - a) / STEP for a, b in zip(values, values[1:])] for name, values in inputs.items()}
+    slopes = {name: [0.0] + [(b - a) / STEP for a, b in itertools.pairwise(values)] for name, values in inputs.items()}
     moved = {**case, "inputs": {"tie": inputs}, "derivatives": {"tie": slopes}}
     expected = plain(moved)
     same_bits({"tie": simulate(case, input=signals(inputs), set_input_derivatives=True)[1:]}, expected)

@@ -5,6 +5,7 @@ errors are against the same system in one scene, integrated by the same method w
 errors of the coupling alone.
 """
 
+import itertools
 from ctypes import byref, c_double, c_size_t, c_uint
 
 import numpy as np
@@ -40,7 +41,7 @@ def host() -> dict:
 
 def tie(mass: float) -> dict:
     return {
-        "mesh": {"nodes": CORNERS + [PART], "segments": [[1, 1, 2, 3, 4]]},
+        "mesh": {"nodes": [*CORNERS, PART], "segments": [[1, 1, 2, 3, 4]]},
         "node": [{"nodes": [101], "mass": mass, "inertia": 2e-4 * mass}],
         "tie": [{"name": "part", "slaves": [101], "formulation": "optimized"}],
         "spring": [{"ground": [101], "kind": "bushing", "stiffness": [1e4, 2e4, 1e4], "damping": 5.0}],
@@ -198,5 +199,5 @@ def test_rollback_converges(scenes):
     host, tie, whole = scenes(2.0)
     expected = in_one(whole)
     found = [error(coupled(host, tie, by_rollback(passes, 0.8)), expected) for passes in (1, 2, 4, 8, 30)]
-    assert all(later < 0.1 * earlier for earlier, later in zip(found, found[1:]))
+    assert all(later < 0.1 * earlier for earlier, later in itertools.pairwise(found))
     assert found[-1] < 1e-12

@@ -2,6 +2,7 @@
 
 import importlib.util
 import zipfile
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -36,7 +37,7 @@ def case(ssp, folder) -> dict:
 
 def test_the_same_bytes_again(ssp, folder):
     again = build_ssp.build(folder / "again.ssp")
-    assert again.read_bytes() == open(ssp, "rb").read()
+    assert again.read_bytes() == Path(ssp).read_bytes()
 
 
 def test_the_structure_is_valid_and_complete(ssp, case):

@@ -14,7 +14,8 @@ FOLDER = "extra/tiefmu"
 
 def reference(scene: Scene, step: float) -> dict[str, bytes]:
     """reference_in.csv and reference_out.csv, or nothing where they would be large or the run fails. Row k of the
-    inputs is set at its time; row k + 1 of the outputs is what the FMU answers after the step from there to the next."""
+    inputs is set at its time; row k + 1 of the outputs is what the FMU answers after the step from there to the
+    next."""
     variables = scene.start.variables
     if sum(len(block["numbers"]) * block["components"] for block in variables) > MOST_VARIABLES:
         return {}
@@ -22,6 +23,7 @@ def reference(scene: Scene, step: float) -> dict[str, bytes]:
     inputs = signals(scene, times)
     outputs = [name for block in variables if block["causality"] == "output" for name in names(block)]
     simulation = scene.simulation()
+    answer = None
     rows = []
     try:
         for k in range(STEPS + 1):

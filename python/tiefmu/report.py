@@ -82,45 +82,29 @@ def slave_rows(scene: Scene, found: dict, order: np.ndarray) -> list[dict]:
     added_inertia = np.where(turns_masters[:, None], s["clamped_weights"] * rotary[:, None], 0.0)
 
     names = [table.name for table in scene.ties]
-    columns = zip(
-        s["id"].tolist(),
-        s["number"].tolist(),
-        s["tie"].tolist(),
-        s["segment"].tolist(),
-        s["xi"].tolist(),
-        s["eta"].tolist(),
-        s["distance"].tolist(),
-        s["d"].tolist(),
-        s["offset"].tolist(),
-        s["nodes"].tolist(),
-        share.tolist(),
-        finite(s["cond"]),
-        s["clamped"].tolist(),
-        finite(s["lambda"]),
-        added_mass.tolist(),
-        added_inertia.tolist(),
-        n.tolist(),
-    )
-    return [
-        {
-            "id": number,
-            "number": j,
-            "tie": names[tie],
-            "segment": segment,
-            "xi": xi,
-            "eta": eta,
-            "distance": distance,
-            "d": d,
-            "offset": offset,
-            "nodes": corners[:k],
-            "weights": weights[:k],
-            "cond": cond,
-            "clamped": bool(clamped),
-            "lambda": lambda_,
-            "added": [{"node": corners[i], "mass": masses[i], "inertia": inertias[i]} for i in range(k)],
-        }
-        for number, j, tie, segment, xi, eta, distance, d, offset, corners, weights, cond, clamped, lambda_, masses, inertias, k in columns
-    ]
+    columns = {
+        "id": s["id"].tolist(),
+        "number": s["number"].tolist(),
+        "tie": [names[tie] for tie in s["tie"].tolist()],
+        "segment": s["segment"].tolist(),
+        "xi": s["xi"].tolist(),
+        "eta": s["eta"].tolist(),
+        "distance": s["distance"].tolist(),
+        "d": s["d"].tolist(),
+        "offset": s["offset"].tolist(),
+        "nodes": s["nodes"].tolist(),
+        "weights": share.tolist(),
+        "cond": finite(s["cond"]),
+        "clamped": s["clamped"].astype(bool).tolist(),
+        "lambda": finite(s["lambda"]),
+    }
+    rows = []
+    for k, masses, inertias, *values in zip(n.tolist(), added_mass.tolist(), added_inertia.tolist(), *columns.values()):
+        row = dict(zip(columns, values))
+        row["nodes"], row["weights"] = row["nodes"][:k], row["weights"][:k]
+        row["added"] = [{"node": row["nodes"][i], "mass": masses[i], "inertia": inertias[i]} for i in range(k)]
+        rows.append(row)
+    return rows
 
 
 def finite(values: np.ndarray) -> list:

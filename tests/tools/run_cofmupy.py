@@ -35,7 +35,7 @@ def simulate(case):
     coordinator = Coordinator()
     coordinator.start(str(config))
     rows = {name: [] for name in case["outputs"]}
-    for k in range(case["steps"]):
+    for _ in range(case["steps"]):
         coordinator.do_step(case["step"])
         answered = coordinator.master.get_outputs()
         for name, outputs in case["outputs"].items():

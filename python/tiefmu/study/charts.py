@@ -32,8 +32,8 @@ HOW_TO_READ = [
     "method. Errors are relative L2 norms over the whole run, against a reference with consistent inertia that is "
     "exact to rounding: of the slaves' velocities, and of the load that the tie puts on its masters.",
     "A curve that turns flat has reached the error of its model - lumped inertia, frozen geometry, a spring in place "
-    "of the tie - which no step cures. The discretisation error, against the same model solved exactly, goes on falling "
-    "with the order of the method.",
+    "of the tie - which no step cures. The discretisation error, against the same model solved exactly, goes on "
+    "falling with the order of the method.",
     "Crosses stand where a step just beyond the stability limit diverged; they have no error and no cost. Inputs are "
     "constant over the same intervals in every run, so that sampling the input is no part of the error.",
 ]
@@ -58,7 +58,7 @@ def curves(rows: list[Row]) -> dict:
 
 def panel(axis, rows: list[Row], x: str, y: str):
     """One work-precision diagram; y: a column of errors."""
-    for (model, method, reaction), points in curves(rows).items():
+    for (_, method, reaction), points in curves(rows).items():
         if reaction == "full" and method in ("held input", "midpoint input"):
             continue  # the same load as "split", by definition
         penalty, lumped = points[0].penalty, points[0].inertia == "lumped"

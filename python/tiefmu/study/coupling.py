@@ -2,6 +2,7 @@
 
 import argparse
 import csv
+import itertools
 import math
 import time
 from dataclasses import asdict, dataclass
@@ -290,7 +291,7 @@ class Study:
             return row
         velocity, load, residual, cpu = run
         times = np.arange(count + 1) * size
-        exact_velocity, exact_load, exact_power = (reference.at(times, key) for key in ("velocity", "load", "power"))
+        exact_velocity, exact_load, _exact_power = (reference.at(times, key) for key in ("velocity", "load", "power"))
         if not relative(velocity, exact_velocity) < 10:
             return row
         row.error_velocity, row.error_force = relative(velocity, exact_velocity), relative(load, exact_load)
@@ -384,7 +385,7 @@ class Reference:
             column = [level[key] for level in levels]
             for power in (4, 16, 64):
                 before = column[-1]
-                column = [fine + (fine - coarse) / (power - 1) for coarse, fine in zip(column, column[1:])]
+                column = [fine + (fine - coarse) / (power - 1) for coarse, fine in itertools.pairwise(column)]
             last[key], error = column[0], max(error, relative(before, column[0]))
         return last, error
 

@@ -48,7 +48,7 @@ class Names:
         self.load = vectors("ft", self.driven, [i for i in self.turning if i in answering])
         # freedom of each entry of `load`: a turning node without a moment output gets none
         self.loaded = np.array(
-            [k for k in range(3 * len(self.driven))]
+            list(range(3 * len(self.driven)))
             + [3 * len(self.driven) + 3 * n + k for n, i in enumerate(self.turning) if i in answering for k in range(3)]
         )
         self.slaves = sorted(found[("slave.v", "output")])
@@ -330,7 +330,7 @@ class Coupling:
         state = rng.normal(size=(self.rows, len(self.host.mass))) / self.units()[:, None]
         self.tie.restart()
         still = self.load(self.rest())
-        peaks = np.zeros(4)
+        peaks, first = np.zeros(4), 0.0
         for k in range(steps):
             following = self.advance(state, self.load(state) - still)[0]
             if self.tie.keeps_state:
@@ -342,7 +342,8 @@ class Coupling:
             size = np.abs(state[2]).max()
             if not size < 1e200:
                 return float(np.inf)
-            first = size if k == 0 else first
+            if k == 0:
+                first = size
             if size <= 1e-9 * first:
                 return float((size / first) ** (1 / k)) if first > 0 else 0.0
             peaks[4 * k // steps] = max(peaks[4 * k // steps], size)

@@ -5,6 +5,7 @@ A scene with free nodes is integrated over equal intervals in which all inputs a
 input. Driven nodes of such a scene are free ones with a mass nothing can move (Variant, `heavy`), accelerated as given.
 """
 
+import itertools
 import time
 from dataclasses import dataclass
 
@@ -159,7 +160,7 @@ class Held:
                 spin[row] = signals.at((node, "w"), edges[0])
                 self.start["spin"] = spin
         self.changes, last = [], {}
-        for a, b in zip(edges[:-1], edges[1:]):
+        for a, b in itertools.pairwise(edges):
             now = {}
             for (node, quantity), _ in signals.values.items():
                 key = (node, quantity)

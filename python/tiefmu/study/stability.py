@@ -164,8 +164,8 @@ def write_page(path: Path, limit_table: list, value_table: list, points: list, f
         path,
         "Where each method fails",
         [
-            "Each limit is found by bisection: by the growth of a run and, where the step is a linear map, by its spectral "
-            "radius; where the program states the limit itself, that is shown as well."
+            "Each limit is found by bisection: by the growth of a run and, where the step is a linear map, by its "
+            "spectral radius; where the program states the limit itself, that is shown as well."
         ],
         [
             page.Section(
@@ -181,13 +181,13 @@ def write_page(path: Path, limit_table: list, value_table: list, points: list, f
             page.Section(
                 "Map",
                 [
-                    "Colours come from the eigenvalues of the one-step map: red where one is larger than 1, else the error of "
-                    "the worst mode's complex frequency against the monolithic system. Circles and crosses are runs: of "
-                    f"{len(both)}, {agreeing(both)} agree with the eigenvalues.",
-                    "'loads' is always stable, and as wrong as its lumping. 'full' ends at r = 1 whatever the step. 'split' "
-                    "survives every ratio as the step goes to zero; at finite steps the held load lags behind the host's "
-                    "springs, which feeds energy in, and the host's damping has to outweigh it: H omega < 2 zeta (1 + r)/(r (r "
-                    "+ 1/2)). Linear extrapolation moves that limit far up.",
+                    "Colours come from the eigenvalues of the one-step map: red where one is larger than 1, else the "
+                    "error of the worst mode's complex frequency against the monolithic system. Circles and crosses "
+                    f"are runs: of {len(both)}, {agreeing(both)} agree with the eigenvalues.",
+                    "'loads' is always stable, and as wrong as its lumping. 'full' ends at r = 1 whatever the step. "
+                    "'split' survives every ratio as the step goes to zero; at finite steps the held load lags behind "
+                    "the host's springs, which feeds energy in, and the host's damping has to outweigh it: "
+                    "H omega < 2 zeta (1 + r)/(r (r + 1/2)). Linear extrapolation moves that limit far up.",
                 ],
                 [("Stability and accuracy over mass ratio and communication step.", figures[1])],
             ),
