@@ -31,7 +31,7 @@ def scene(rng, formulation, rotations, motion, inertia, reaction, geometry, posi
     dampers to a driven and to a free point."""
     turn, _ = np.linalg.qr(rng.normal(size=(3, 3)))
     sheet = np.array([[0, 0, 0], [1, 0, 0.1], [1.1, 0.9, 0], [0, 1, 0.15], [2, 0.4, 0.1]])
-    corners = np.vstack([sheet, [*sheet, 0, 0, 3]]) + 0.05 * rng.normal(size=(10, 3))
+    corners = np.vstack([sheet, sheet + [0, 0, 3]]) + 0.05 * rng.normal(size=(10, 3))
     slaves = np.array([[0.3, 0.4, 0.3], [0.7, 0.6, -0.2], [1.4, 0.5, 0.25], [0.4, 0.7, 3.4], [1.5, 0.45, 2.7]])
     points = np.array([[0.5, 0.5, 1.2], [0.6, 0.4, 2.2]])
     nodes = [

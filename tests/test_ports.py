@@ -248,13 +248,13 @@ def test_a_thousand_revolutions(formulation, rotations):
     vector(simulation, "port[base].v", np.array([1e-3, 0.0, 0.0]))
     for _ in range(steps):
         simulation.step(1.0)
-    moved = [*place, 0.001 * steps, 0, 0]
+    moved = place + [1e-3 * steps, 0, 0]
     np.testing.assert_allclose(vector(simulation, "port[base].r"), moved, atol=1e-10)
     np.testing.assert_allclose(simulation.get("slave_position") - moved, start - place, atol=1e-10)
     assert simulation.get_values(["drift"])[0] < 1e-12
     # An odd part of a turn more.
     simulation.step(0.3)
-    moved = [*moved, 0.0003, 0, 0]
+    moved = moved + [3e-4, 0, 0]
     turned = (start - place) @ exponential(0.3 * per * axis).T
     np.testing.assert_allclose(simulation.get("slave_position") - moved, turned, atol=1e-10)
     # A port of slaves that ride on it has its motion, and its lever turns with them.
@@ -265,7 +265,7 @@ def test_a_thousand_revolutions(formulation, rotations):
     np.testing.assert_allclose(vector(simulation, "port[load].w"), per * axis, atol=1e-12)
     np.testing.assert_allclose(
         vector(simulation, "port[load].v"),
-        [0.001, 0, 0, *np.cross(per * axis, exponential(0.3 * per * axis) @ lever)],
+        [1e-3, 0, 0] + np.cross(per * axis, exponential(0.3 * per * axis) @ lever),
         atol=1e-10,
     )
 

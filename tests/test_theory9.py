@@ -75,7 +75,7 @@ def test_a_turned_segment_is_the_same_segment(inertia):
 
 def rivet_outside():
     """A bushing between slaves that lie outside their segments."""
-    lower, upper = QUAD, [*QUAD, 0, 0, 1]
+    lower, upper = QUAD, QUAD + [0, 0, 1]
     return {
         "mesh": {
             "nodes": rows(1, lower) + rows(11, upper) + [[5, 1.2, 1.2, 0.3], [15, 1.2, 1.2, 0.8]],

@@ -19,7 +19,7 @@ def panel(formulation: str, rotations: bool, motion: str, side: int = 64, shuffl
     corner = (np.arange(side)[:, None] * (side + 1) + np.arange(side)).ravel()
     quads = np.stack([corner, corner + 1, corner + side + 2, corner + side + 1], axis=-1)
     centre = x[quads].mean(axis=1)
-    slaves = np.concatenate([[*centre, 0.2, 0.1, 0.3], [*centre, -0.3, 0.2, -0.2]])
+    slaves = np.concatenate([centre + [0.2, 0.1, 0.3], centre + [-0.3, 0.2, -0.2]])
     places = np.concatenate([x, slaves])
     ids = np.arange(1, len(places) + 1)
     if shuffled:
