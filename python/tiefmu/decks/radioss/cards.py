@@ -1,0 +1,342 @@
+"""Radioss starter files as blocks: a keyword line and its cards, includes followed, comments left out.
+
+A block remembers of each card the file and the line, so that messages can name them. Columns are fixed: integers 10
+wide and reals 20 wide, in formats before 5.1 8 and 16 wide; the title of a block stands on its keyword line there, on
+its first card since.
+"""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from ..._core import SceneError
+from ...schema import shortened
+
+MOST_INCLUDES = 1000
+
+
+@dataclass
+class Source:
+    """A deck's files while they are read. version: of the input format, e.g. 2021 or 44."""
+
+    file: str
+    version: int = 2026
+    files: list[str] = field(default_factory=list)
+
+    @property
+    def old(self) -> bool:
+        return self.version < 50
+
+    @property
+    def integer(self) -> int:
+        return 8 if self.old else 10
+
+    @property
+    def real(self) -> int:
+        return 16 if self.old else 20
+
+
+@dataclass
+class Offsets:
+    """What a //SUBMODEL adds to the ids of its blocks; submodel: its own id."""
+
+    other: int = 0
+    node: int = 0
+    element: int = 0
+    part: int = 0
+    material: int = 0
+    property: int = 0
+    submodel: int = 0
+    inside: tuple[int, ...] = ()  # this submodel and those around it
+
+
+@dataclass
+class Block:
+    """key: the keyword's words, e.g. ["INTER", "TYPE2", "7"]; file, number: where it stands; lines: its cards, as
+    bytes; numbers: their lines; files: [(first card, file)] of those in an include."""
+
+    source: Source
+    key: list[str]
+    file: str
+    number: int
+    offsets: Offsets
+    lines: list[bytes] = field(default_factory=list)
+    numbers: list[int] = field(default_factory=list)
+    files: list[tuple[int, str]] = field(default_factory=list)
+
+    @property
+    def name(self) -> str:
+        return "/" + "/".join(self.key)
+
+    @property
+    def where(self) -> str:
+        return f"{self.file}: line {self.number}: {shortened(self.name)}"
+
+    def at(self, card: int) -> str:
+        """How messages call a card."""
+        number = self.numbers[card] if card < len(self.numbers) else (self.numbers or [self.number])[-1]
+        file = next((file for first, file in reversed(self.files) if first <= card), self.file)
+        return f"{file}: line {number}: {shortened(self.name)}"
+
+    def fail(self, text: str, card: int | None = None):
+        raise SceneError(f"{self.where if card is None else self.at(card)}: {text}")
+
+    def id(self, place: int, what: str) -> int:
+        """The number at `place` of the keyword's words, with the submodel's offset for `what`."""
+        word = self.key[place] if place < len(self.key) else ""
+        if not word.strip().isdigit():
+            self.fail(f"expected an id in the keyword, found '{shortened(word)}'")
+        return int(word) + getattr(self.offsets, what)
+
+    def titled(self) -> tuple[str, "Cards"]:
+        """The title, and the cards behind it."""
+        if self.source.old:
+            words = [word for word in self.key[1:] if not word.strip().isdigit()]
+            return (words[-1].strip() if words and not self.key[-1].strip().isdigit() else ""), Cards(self, 0)
+        if not self.lines:
+            self.fail("is cut off: no title")
+        return self.lines[0].decode("utf-8", "replace").strip(), Cards(self, 1)
+
+    def cards(self) -> "Cards":
+        return Cards(self, 0)
+
+
+class Cards:
+    """The cards of a block from `first` on, read column by column."""
+
+    def __init__(self, block: Block, first: int):
+        self.block, self.first = block, first
+
+    def __len__(self) -> int:
+        return len(self.block.lines) - self.first
+
+    def without_blanks(self) -> "Cards":
+        """The same without blank cards at the end."""
+        lines = self.block.lines
+        while len(lines) > self.first and not lines[-1].strip():
+            lines.pop()
+        return self
+
+    def need(self, card: int) -> bytes:
+        if card >= len(self):
+            self.block.fail(f"is cut off: card {card + 1} is missing", self.first + card)
+        return self.block.lines[self.first + card]
+
+    def read(self, card: int, layout: str) -> list:
+        """Fields of one card: i an integer, r a real, s a text of an integer's width, . a blank integer's width.
+        Fields that are blank or missing are 0 or ''."""
+        line, found, start = self.need(card), [], 0
+        source = self.block.source
+        for letter in layout:
+            width = source.real if letter == "r" else source.integer
+            text = line[start : start + width].decode("latin-1").strip()
+            start += width
+            if letter == ".":
+                continue
+            try:
+                found.append(text if letter == "s" else (whole(text) if letter == "i" else real(text)))
+            except ValueError:
+                kind = "a number" if letter == "r" else "a whole number"
+                self.block.fail(
+                    f"columns {start - width + 1} to {start}: expected {kind}, found '{shortened(text)}'"
+                    + ("; /PARAMETER is not supported" if text.startswith("&") else ""),
+                    self.first + card,
+                )
+        return found
+
+    def table(self, integers: int, reals: int = 0, start: int = 0, step: int = 1, blank: int = 0):
+        """Columns of all cards from `start` on, every `step`-th: (integers (n, k), reals (n, m), card indices).
+        `integers` columns come first, then `blank` columns of an integer's width, then `reals`. Blank cards are left
+        out."""
+        source = self.block.source
+        index = range(self.first + start, len(self.block.lines), step)
+        lines = [self.block.lines[i] for i in index]
+        wide = source.integer * (integers + blank) + source.real * reals
+        if not lines:
+            return np.empty((0, integers), np.int64), np.empty((0, reals)), np.empty(0, int)
+        text = np.array(lines, dtype=f"S{wide}")
+        text = text.view(np.uint8).reshape(len(lines), wide).copy()
+        text[(text == 0) | (text == 9)] = 32
+        index = np.arange(len(lines)) * step + start
+        if step == 1:
+            given = (text != 32).any(axis=1)
+            text, index = text[given], index[given]
+        whole_columns = [
+            self._column(text[:, i * source.integer : (i + 1) * source.integer], np.int64, index, i * source.integer)
+            for i in range(integers)
+        ]
+        first = (integers + blank) * source.integer
+        real_columns = [
+            self._column(text[:, first + i * source.real : first + (i + 1) * source.real], float, index, first)
+            for i in range(reals)
+        ]
+        return (
+            np.stack(whole_columns, axis=1) if integers else np.empty((len(index), 0), np.int64),
+            np.stack(real_columns, axis=1) if reals else np.empty((len(index), 0)),
+            index,
+        )
+
+    def _column(self, text: np.ndarray, dtype, index: np.ndarray, first: int) -> np.ndarray:
+        """Numbers of one column (n, width) of characters."""
+        text = np.ascontiguousarray(text)
+        width = text.shape[1]
+        empty = (text == 32).all(axis=1)
+        if empty.any():
+            text[empty, -1] = ord("0")
+        if dtype is float:
+            text[(text == ord("D")) | (text == ord("d"))] = ord("e")
+        column = text.reshape(-1).view(f"S{width}")
+        try:
+            return column.astype(dtype)
+        except (ValueError, OverflowError):
+            pass
+        found = np.empty(len(column), dtype)
+        for row, item in enumerate(column.tolist()):
+            word = item.decode("latin-1").strip()
+            try:
+                found[row] = whole(word) if dtype is np.int64 else real(word)
+            except (ValueError, OverflowError):
+                kind = "a number" if dtype is float else "a whole number"
+                self.block.fail(
+                    f"columns {first + 1} to {first + width}: expected {kind}, found '{shortened(word)}'",
+                    self.first + int(index[row]),
+                )
+        return found
+
+    def ids(self, start: int = 0) -> np.ndarray:
+        """All integers of all cards from `start` on, ten to a card, zeros left out; negative ones as they are."""
+        whole_columns, _, _ = self.table(10, start=start)
+        found = whole_columns.ravel()
+        return found[found != 0]
+
+
+def whole(text: str) -> int:
+    if not text:
+        return 0
+    number = int(text)
+    if abs(number) >= 2**62:
+        raise ValueError
+    return number
+
+
+def real(text: str) -> float:
+    """Fortran's numbers: 1.5, 1.D-3, .3, 1.5-3."""
+    if not text:
+        return 0.0
+    text = text.replace("D", "e").replace("d", "e")
+    try:
+        return float(text)
+    except ValueError:
+        place = max(text.rfind("+"), text.rfind("-"))
+        if place > 0 and text[place - 1] not in "eE":
+            return float(f"{text[:place]}e{text[place:]}")
+        raise
+
+
+def read(path: Path, file: str) -> tuple[Source, list[Block]]:
+    """The blocks of a deck and of what it includes. `file`: how messages call it."""
+    reader = Reader(Source(file))
+    reader.read(path, file)
+    if len(reader.offsets) > 1:
+        raise SceneError(f"{file}: //SUBMODEL {reader.offsets[-1].submodel}: //ENDSUB is missing")
+    return reader.source, reader.blocks
+
+
+class Reader:
+    """Reads files one into the other; `block` is the one that cards go to."""
+
+    def __init__(self, source: Source):
+        self.source, self.blocks, self.block = source, [], None
+        self.offsets, self.open = [Offsets()], []
+
+    def read(self, path: Path, name: str):
+        if path.resolve() in self.open:
+            raise SceneError(f"{name}: includes itself")
+        if len(self.source.files) > MOST_INCLUDES:
+            raise SceneError(f"{name}: more than {MOST_INCLUDES} includes")
+        self.open.append(path.resolve())
+        self.source.files.append(name)
+        data = path.read_bytes()
+        if self.block is not None:
+            self.block.files.append((len(self.block.lines), name))
+        for number, line in enumerate(data.split(b"\n"), 1):
+            first = line[:1]
+            if first == b"#" or first == b"$":
+                if line[:8].lower() == b"#include":
+                    self.include(path, name, number, line)
+                elif line.strip().lower() in (b"#enddata", b"#end"):
+                    break
+            elif first == b"/":
+                if line[:5].strip() == b"/END":
+                    break
+                self.keyword(name, number, line)
+            elif self.block is not None:
+                self.block.lines.append(line[:-1] if line.endswith(b"\r") else line)
+                self.block.numbers.append(number)
+                if len(self.block.lines) == 2:
+                    self.look(self.block)
+            elif line.strip():
+                raise SceneError(f"{name}: line {number}: expected a keyword such as /BEGIN, found '{excerpt(line)}'")
+        self.open.pop()
+
+    def keyword(self, name: str, number: int, line: bytes):
+        words = [word.strip() for word in line.decode("utf-8", "replace").split("/")]
+        while len(words) > 2 and not words[-1]:
+            words.pop()
+        if line.startswith(b"//"):
+            words = self.submodel(name, number, [words[2].upper(), *words[3:]] if len(words) > 2 else [""])
+            if words is None:
+                self.block = None
+                return
+        else:
+            words = words[1:]
+            words[:2] = [word.upper() for word in words[:2]]
+        self.block = Block(self.source, words, name, number, self.offsets[-1])
+        self.blocks.append(self.block)
+
+    def look(self, block: Block):
+        """What changes how the rest is read: the version of the format, and offsets of a submodel."""
+        if block.key[0] == "BEGIN":
+            word = block.lines[1][:10].split()
+            if word and word[0].isdigit():
+                self.source.version = int(word[0])
+        elif block.key[0] == "SUBMODEL":
+            off = Cards(block, 0).read(1, "iiiiii")
+            outer, own = self.offsets[-2], self.offsets[-1]
+            for key, value in zip(("other", "node", "element", "part", "material", "property"), off):
+                setattr(own, key, getattr(outer, key) + (value or off[0]))
+
+    def submodel(self, name: str, number: int, words: list[str]) -> list[str] | None:
+        """Words of the keyword //SUBMODEL; None for //ENDSUB."""
+        if words[0] == "SUBMODEL":
+            own = Offsets(**vars(self.offsets[-1]))
+            own.submodel = int(words[1]) if len(words) > 1 and words[1].isdigit() else 0
+            own.inside = (*own.inside, own.submodel)
+            self.offsets.append(own)
+            return words
+        if words[0] == "ENDSUB":
+            if len(self.offsets) == 1:
+                raise SceneError(f"{name}: line {number}: //ENDSUB without //SUBMODEL")
+            self.offsets.pop()
+            return None
+        raise SceneError(
+            f"{name}: line {number}: //{shortened(words[0])} is not understood; //SUBMODEL and //ENDSUB are"
+        )
+
+    def include(self, path: Path, name: str, number: int, line: bytes):
+        words = line.decode("utf-8", "replace").split(None, 1)
+        if len(words) < 2:
+            raise SceneError(f"{name}: line {number}: #include names no file")
+        target = words[1].strip().strip("\"'")
+        try:
+            before = self.block
+            self.read(path.parent / target, target)
+            if before is not None and self.block is before:
+                before.files.append((len(before.lines), name))
+        except OSError as error:
+            raise SceneError(f"{name}: line {number}: #include: {target}: {error.strerror or error}") from None
+
+
+def excerpt(line: bytes) -> str:
+    return shortened(line.decode("utf-8", "replace").strip())
