@@ -10,6 +10,7 @@ from pathlib import Path
 
 from . import __version__, advise, study
 from ._core import SceneError
+from .decks import command as import_command
 from .run import RunError
 
 
@@ -93,6 +94,7 @@ def parser() -> argparse.ArgumentParser:
     demo.add_argument("--scenes", metavar="DIR", type=Path, help="folder of the scenes (default: of the checkout)")
     demo.set_defaults(command=run_demo)
 
+    import_command.add_parser(commands)
     study.add_parser(commands)
     advise.add_parser(commands)
     return top

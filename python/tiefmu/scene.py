@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from . import _core, mesh, schema
+from . import _core, decks, mesh, schema
 from ._core import SceneError
 from .mesh import properties
 from .mesh.data import listed
@@ -52,14 +52,16 @@ class Scene:
 def load(source) -> Scene:
     """Reads, checks and compiles a scene.
 
-    source: path of a TOML file, or a dict of the same shape (NumPy arrays may stand for lists; messages call it
-    "scene"; a mesh file is taken relative to the current folder). Raises SceneError, one line
+    source: path of a TOML file or of a deck (decks/), or a dict of the same shape (NumPy arrays may stand for lists;
+    messages call it "scene"; a mesh file is taken relative to the current folder). Raises SceneError, one line
     "FILE: table: id: message", on the first thing that is wrong.
     """
     if isinstance(source, dict):
         file, name, folder = "scene", "scene", Path(".")
     else:
         file, name, folder = os.fspath(source), Path(source).stem, Path(source).parent
+        if decks.is_deck(Path(source)):
+            return decks.load(Path(source))
     try:
         raw = plain(source) if isinstance(source, dict) else read_toml(Path(source))
         return Scene(file, name, schema.parse(raw), folder)

@@ -12,17 +12,7 @@ import numpy as np
 from .._core import SceneError
 
 # Nodes of one element. A shell4 or hex8 may repeat a node (a triangle, a wedge); a mid-side node of a tet10 may be -1.
-KINDS = {
-    "shell4": 4,
-    "shell3": 3,
-    "hex8": 8,
-    "wedge6": 6,
-    "tet4": 4,
-    "tet10": 10,
-    "spring": 2,
-    "truss": 2,
-    "beam": 2,
-}
+KINDS = {"shell4": 4, "shell3": 3, "hex8": 8, "wedge6": 6, "tet4": 4, "tet10": 10, "spring": 2, "truss": 2, "beam": 2}
 SHELLS = ("shell4", "shell3")
 SOLIDS = ("hex8", "wedge6", "tet4", "tet10")
 

@@ -12,8 +12,8 @@ EPS = 1e-9
 
 
 def spring_tables(deck: Deck, slave: np.ndarray, tied: np.ndarray, loose: np.ndarray):
-    """([[spring]] tables in the deck's units, which springs they hold, nodes at their ends): of springs with an end that
-    is a slave or a free node of the scene."""
+    """([[spring]] tables in the deck's units, which springs they hold, nodes at their ends): of springs with an end
+    that is a slave or a free node of the scene."""
     springs = deck.elements.get("spring")
     if springs is None:
         return [], None, np.empty(0, np.int64)
@@ -51,8 +51,7 @@ def tables_of(deck: Deck, prop, a: int, b: int, number: int) -> list[dict]:
     length = float(np.linalg.norm(axis))
     scale = length if values.get("per_length") else 1.0
     k, c, kr, cr = (
-        np.array(values[key]) / scale
-        for key in ("stiffness", "damping", "rotational_stiffness", "rotational_damping")
+        np.array(values[key]) / scale for key in ("stiffness", "damping", "rotational_stiffness", "rotational_damping")
     )
     if values["type"] == "axial":
         return [{"kind": "axial", "stiffness": float(k[0]), "damping": float(c[0])}]
@@ -67,7 +66,9 @@ def tables_of(deck: Deck, prop, a: int, b: int, number: int) -> list[dict]:
     else:
         bushing = [mean(deck, prop, vector) for vector in (k, c, kr, cr)]
     names = ("stiffness", "damping", "rotational_stiffness", "rotational_damping")
-    tables.insert(0, {"kind": "bushing"} | {n: v.tolist() for n, v in zip(names, bushing) if v.any() or n == "stiffness"})
+    tables.insert(
+        0, {"kind": "bushing"} | {n: v.tolist() for n, v in zip(names, bushing) if v.any() or n == "stiffness"}
+    )
     return tables
 
 

@@ -10,10 +10,11 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from .._core import SceneError
-from ..units import LENGTHS, MASSES, TIMES, Units
+from ..units import DIMENSIONS, LENGTHS, MASSES, TIMES
 from .element_properties import Nodal, nodal
 from .model import Deck, Faces, Tie
 from .springs import spring_tables
+from .surfaces import match_rows
 
 
 @dataclass
@@ -70,9 +71,10 @@ def convert(deck: Deck, free: tuple[str, ...] = ()) -> Written:
     if ports:
         written.tables["interface"] = {"ports": ports}
     moved = used & ~slave
+    fixed, free_now = moved & held["fixed"], moved & loose & ~held["fixed"]
     deck.notes.append(
-        f"{slave.sum()} slaves, {(moved & loose & ~held['fixed']).sum()} free, {(moved & held['fixed']).sum()} fixed and "
-        f"{(moved & ~loose & ~held['fixed']).sum()} driven nodes; the host moves driven ones, --free NAME frees a part or set"
+        f"{slave.sum()} slaves, {free_now.sum()} free, {fixed.sum()} fixed and {(moved & ~fixed & ~free_now).sum()} "
+        "driven nodes; the host moves driven ones, --free NAME frees those of a part or set"
     )
     return written
 
@@ -84,7 +86,9 @@ class Scale:
         named = all(isinstance(unit, str) for unit in deck.units)
         self.names = dict(zip(("length", "mass", "time"), deck.units)) if named else {}
         tables = (LENGTHS, MASSES, TIMES)
-        self.factors = [table[unit] if isinstance(unit, str) else unit for unit, table in zip(deck.units, tables)]
+        self.factors = [
+            float(table[unit] if isinstance(unit, str) else unit) for unit, table in zip(deck.units, tables)
+        ]
         if not named:
             deck.notes.append("the deck's units have no name in a scene; its values are written in m, kg and s")
 
@@ -94,7 +98,9 @@ class Scale:
     def of(self, key: str, value):
         if self.names:
             return np.asarray(value, float)
-        return Units.factor(key, self.factors) * np.asarray(value, float)
+        return float(np.prod([factor**power for factor, power in zip(self.factors, DIMENSIONS[key])])) * np.asarray(
+            value, float
+        )
 
     def number(self, key: str, value: float) -> float:
         return float(self.of(key, value))
@@ -155,8 +161,8 @@ def hold(deck: Deck, slave: np.ndarray, master: np.ndarray, loose: np.ndarray) -
     tied = np.flatnonzero(slave & held.any(axis=1))
     if len(tied):
         deck.warn(
-            f"{len(tied)} slaves, the first is node {deck.node_id[tied[0]]}, are held by boundary conditions too; the tie "
-            "wins, as it does in the starter"
+            f"{len(tied)} slaves, the first is node {deck.node_id[tied[0]]}, are held by boundary conditions too; the "
+            "tie wins, as it does in the starter"
         )
     imposed = np.zeros(n, bool)
     imposed[deck.imposed] = True
@@ -179,8 +185,8 @@ def hold(deck: Deck, slave: np.ndarray, master: np.ndarray, loose: np.ndarray) -
     partly = held.any(axis=1) & ~fixed & loose & (master | slave) & ~slave
     if partly.any():
         deck.warn(
-            f"{partly.sum()} free nodes, the first is node {deck.node_id[np.argmax(partly)]}, are held in some directions "
-            "only; a scene cannot hold single directions, and they are free in all"
+            f"{partly.sum()} free nodes, the first is node {deck.node_id[np.argmax(partly)]}, are held in some "
+            "directions only; a scene cannot hold single directions, and they are free in all"
         )
     if (fixed & master).any():
         deck.notes.append(f"{(fixed & master).sum()} masters are fixed by boundary conditions")
@@ -262,8 +268,6 @@ def tie_table(deck: Deck, tie: Tie, written: Written, scale: Scale) -> dict:
     slaves, main = unique_name(f"{tie.name} slaves", written.node_sets), unique_name(tie.name, written.segment_sets)
     written.node_sets[slaves] = np.sort(deck.node_id[tie.slaves])
     wanted = np.sort(np.where(tie.faces.nodes < 0, 0, deck.node_id[tie.faces.nodes]), axis=1)
-    from .surfaces import match_rows
-
     place = match_rows(np.sort(written.segments, axis=1), wanted)
     written.segment_sets[main] = np.sort(written.segment_id[np.unique(place)])
     table = {
@@ -278,7 +282,9 @@ def tie_table(deck: Deck, tie: Tie, written: Written, scale: Scale) -> dict:
         table["search_distance"] = scale.number("search_distance", tie.search_distance)
     if tie.pairwise is not None:
         tolerance = pair_tolerance(deck, tie)
-        largest = np.maximum(tolerance["diagonal"].max(), tie.pairwise[1] * (tolerance["t_s"].max() + tolerance["t_m"].max()))
+        largest = np.maximum(
+            tolerance["diagonal"].max(), tie.pairwise[1] * (tolerance["t_s"].max() + tolerance["t_m"].max())
+        )
         table["search_distance"] = scale.number("search_distance", float(largest))
         tolerance["segment"] = written.segment_id[place]
         tolerance["factor"] = float(scale.factors[0])
@@ -343,8 +349,8 @@ def rigid_ports(deck: Deck, written: Written, driven: np.ndarray, slave: np.ndar
         if slave[members].any():
             node = deck.node_id[members[slave[members]][0]]
             deck.warn(
-                f"{body.where}: rigid body '{body.name}' holds slaves, the first is node {node}; the tie wins, as it does "
-                "in the starter"
+                f"{body.where}: rigid body '{body.name}' holds slaves, the first is node {node}; the tie wins, as it "
+                "does in the starter"
             )
         members = members[driven[members] & ~taken[members]]
         if not len(members):

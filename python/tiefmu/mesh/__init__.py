@@ -2,7 +2,7 @@
 
 data.py              Mesh (what ties ask), MeshFile (what a reader hands on)
 faces.py             faces of solids
-abaqus.py, abaqus_assembly.py, nastran.py, gmsh.py, exodus.py, med.py, meshio_reader.py    the readers
+abaqus.py, abaqus_assembly.py, nastran.py, gmsh.py, exodus.py, med.py, arrays.py, meshio_reader.py    the readers
 properties.py        [mesh] properties
 """
 
@@ -12,7 +12,7 @@ import numpy as np
 
 from .._core import SceneError
 from ..schema import LARGEST
-from . import abaqus_assembly, exodus, gmsh, med, meshio_reader, nastran
+from . import abaqus_assembly, arrays, exodus, gmsh, med, meshio_reader, nastran
 from .data import Mesh, MeshFile
 
 BY_ENDING = {
@@ -20,6 +20,7 @@ BY_ENDING = {
     ".bdf": nastran.read,
     ".nas": nastran.read,
     ".fem": nastran.read,
+    ".npz": arrays.read,
     ".med": med.read,
     ".e": exodus.read,
     ".exo": exodus.read,

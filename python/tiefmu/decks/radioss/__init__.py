@@ -31,7 +31,7 @@ def recognises(path: Path, head: bytes) -> bool:
 def read(path: Path, file: str, wanted: list[str] | None = None) -> Deck:
     """The deck, with the ties named in `wanted` (titles or ids), or all of them. SceneError on the first thing that is
     wrong: "FILE: line N: /KEYWORD: message"."""
-    source, blocks = read_blocks(path, file)
+    blocks = read_blocks(path, file)
     deck = Deck(file, "Radioss")
     by_name: dict[str, list[Block]] = {}
     for block in blocks:
@@ -162,7 +162,9 @@ def lookup(deck: Deck, sets: Sets, name: str) -> np.ndarray | None:
 
 
 def left(deck: Deck, block: Block, why: str):
-    entry = deck.ignored.setdefault("/" + "/".join(block.key[:1] if block.key[0] != "INTER" else block.key[:2]), [why, 0])
+    entry = deck.ignored.setdefault(
+        "/" + "/".join(block.key[:1] if block.key[0] != "INTER" else block.key[:2]), [why, 0]
+    )
     entry[1] += 1
 
 

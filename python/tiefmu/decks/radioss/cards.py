@@ -234,13 +234,13 @@ def real(text: str) -> float:
         raise
 
 
-def read(path: Path, file: str) -> tuple[Source, list[Block]]:
+def read(path: Path, file: str) -> list[Block]:
     """The blocks of a deck and of what it includes. `file`: how messages call it."""
     reader = Reader(Source(file))
     reader.read(path, file)
     if len(reader.offsets) > 1:
         raise SceneError(f"{file}: //SUBMODEL {reader.offsets[-1].submodel}: //ENDSUB is missing")
-    return reader.source, reader.blocks
+    return reader.blocks
 
 
 class Reader:

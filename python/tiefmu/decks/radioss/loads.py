@@ -88,14 +88,16 @@ def admas(deck: Deck, sets: Sets, block: Block):
 
 def inivel(deck: Deck, sets: Sets, block: Block):
     kind = block.key[1]
-    title, cards = block.titled()
+    _, cards = block.titled()
     if kind not in ("TRA", "ROT", "T+G"):
         if kind not in ("GRID", "FVM"):
             deck.warn(f"{block.where}: its start velocities are not taken; give them as [[initial]]")
         return
     *vector, number, skew = cards.read(0, "rrrii")
     if skew:
-        deck.warn(f"{block.where}: its start velocities stand in skew {skew} and are not taken; give them as [[initial]]")
+        deck.warn(
+            f"{block.where}: its start velocities stand in skew {skew} and are not taken; give them as [[initial]]"
+        )
         return
     nodes = group(sets, number, block) if number else np.arange(len(deck.node_id))
     values = np.array(vector)

@@ -1,4 +1,4 @@
-"""Sets of a Radioss deck, resolved when asked for: /GRNOD, /GRSHEL and the like, /GRPART, /SURF, /SET, /SUBSET, /BOX."""
+"""Sets of a Radioss deck, resolved when asked for: /GRNOD, /GRSHEL and the like, /GRPART, /SURF, /SET, /BOX."""
 
 import numpy as np
 
@@ -137,7 +137,9 @@ class Sets:
         kind = block.key[1] if not block.key[1].isdigit() else "RECTA"
         if kind == "BOX":
             mask = np.zeros(len(x), bool)
-            return combine(mask, self.nested("BOX", self.shifted(cards.ids(), block.offsets.other), block, self.box_mask))
+            return combine(
+                mask, self.nested("BOX", self.shifted(cards.ids(), block.offsets.other), block, self.box_mask)
+            )
         first = cards.read(0, "iiir" if kind != "RECTA" else "iii")
         corners = []
         for card in range(1, 3):
@@ -253,7 +255,9 @@ class Sets:
             return self.segments(rows[:, 0], rows[:, 1:], block, index)
         ids = cards.ids()
         if kind in ("SURF", "DSURF"):
-            found = [faces for _, faces in self.nested("SURF", self.shifted(ids, block.offsets.other), block, self.faces_of)]
+            found = [
+                faces for _, faces in self.nested("SURF", self.shifted(ids, block.offsets.other), block, self.faces_of)
+            ]
             return Faces.joined(found)
         selected = self.elements_named(kind, ids, block)
         if selected is None:
@@ -433,7 +437,9 @@ class GeneralSet:
                     self.removed |= other.node_mask()
         elif kind == "BOX":
             mask = np.zeros_like(self.single)
-            self.single |= combine(mask, sets.nested("BOX", sets.shifted(numbers, block.offsets.other), block, sets.box_mask))
+            self.single |= combine(
+                mask, sets.nested("BOX", sets.shifted(numbers, block.offsets.other), block, sets.box_mask)
+            )
         else:
             block.fail(f"the clause {word} is not understood")
 

@@ -13,7 +13,14 @@ PREFIXES = {
 NAMES = {"Mg": "t", "mum": "um", "mus": "us"}  # of a scene, where they differ
 KNOWN = (LENGTHS, MASSES, TIMES)
 # Systems that people use, for decks that name none, or the wrong one.
-SYSTEMS = [("m", "kg", "s"), ("mm", "t", "s"), ("mm", "kg", "ms"), ("mm", "g", "ms"), ("cm", "g", "us"), ("mm", "g", "s")]
+SYSTEMS = [
+    ("m", "kg", "s"),
+    ("mm", "t", "s"),
+    ("mm", "kg", "ms"),
+    ("mm", "g", "ms"),
+    ("cm", "g", "us"),
+    ("mm", "g", "s"),
+]
 STEEL = 7850.0, 2.1e11
 SPEEDS = 30.0, 20000.0  # m/s: sqrt(E / rho) of what parts are made of, from foam to ceramics
 
@@ -81,9 +88,14 @@ def check(deck: Deck, begin: Block | None, said):
     if not plausible(material, deck.units):
         speed = math.sqrt(modulus(material, deck.units) / density(material, deck.units))
         deck.warn(
-            f"{where}: its units cannot be right: in them material {material.id} has {density(material, deck.units):.4g} "
-            f"kg/m3, {modulus(material, deck.units):.4g} Pa and waves of {speed:.4g} m/s"
-            + (f"; in {name} it would have {density(material, best):.4g} and {modulus(material, best):.4g}" if fits else "")
+            f"{where}: its units cannot be right: in them material {material.id} has "
+            f"{density(material, deck.units):.4g} kg/m3, {modulus(material, deck.units):.4g} Pa and waves of "
+            f"{speed:.4g} m/s"
+            + (
+                f"; in {name} it would have {density(material, best):.4g} and {modulus(material, best):.4g}"
+                if fits
+                else ""
+            )
             + "; they are kept as the deck says"
         )
 
