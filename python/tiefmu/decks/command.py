@@ -11,7 +11,7 @@ def add_parser(commands):
         "import",
         help="write the scene of a finite-element deck's ties",
         description="Reads the ties of a Radioss starter deck, with the masses, inertias, stiffnesses and rotations "
-        "that the solver would give their nodes, and writes a scene file, with its mesh and its node properties beside it. "
+        "that the solver would give their nodes, and writes a scene file, with mesh and node properties beside it. "
         "What was decided and why stands at the head of the scene file.",
     )
     command.add_argument("deck", metavar="DECK", type=Path, help="starter deck, e.g. model_0000.rad")
