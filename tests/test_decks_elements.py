@@ -9,7 +9,12 @@ from tiefmu.decks.element_properties import nodal
 E, NU, RHO = 2.0e11, 0.25, 8000.0
 A11, G, BULK = E / (1 - NU**2), E / 2.5, E / 1.5
 SQUARE = {1: (0, 0, 0), 2: (2, 0, 0), 3: (2, 1, 0), 4: (0, 1, 0)}  # 2 m by 1 m
-TIE = {9001: (0, 0, 50), 9002: (9, 0, 50), 9003: (0, 9, 50), 9004: (1, 1, 51)}  # a deck must have a tie; it is out of the way
+TIE = {
+    9001: (0, 0, 50),
+    9002: (9, 0, 50),
+    9003: (0, 9, 50),
+    9004: (1, 1, 51),
+}  # a deck must have a tie; it is out of the way
 
 
 def read(deck: RadiossDeck, tmp_path, nodes: dict):
@@ -79,7 +84,9 @@ def test_thickness_of_element_over_part_over_property(tmp_path):
     deck = RadiossDeck().elastic(1, RHO, E, NU).shell(1, 0.1).part(1).part(2, thickness=0.2)
     deck.elements("SHELL", 1, {1: (4, 5, 9, 8)}, {}).elements("SHELL", 2, {2: (6, 7, 11, 10), 3: (1, 2, 3, 12)})
     deck = RadiossDeck().elastic(1, RHO, E, NU).shell(1, 0.1).part(1).part(2, thickness=0.2)
-    deck.elements("SHELL", 1, {1: (4, 5, 9, 8)}).elements("SHELL", 2, {2: (6, 7, 11, 10), 3: (12, 13, 16, 15)}, {3: 0.4})
+    deck.elements("SHELL", 1, {1: (4, 5, 9, 8)}).elements(
+        "SHELL", 2, {2: (6, 7, 11, 10), 3: (12, 13, 16, 15)}, {3: 0.4}
+    )
     found = read(deck, tmp_path, nodes | {16: (4, 4, 0), 15: (3, 4, 0), 12: (3, 3, 0), 13: (4, 3, 0)})
     close(found[4], m=8000 * 0.1 / 4)
     close(found[6], m=8000 * 0.2 / 4)
