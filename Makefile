@@ -1,11 +1,14 @@
 # make demo   set everything up, build the example scenes as FMUs, run them, write out/
-# make test   set everything up, with the tools below, run all tests
+# make test   set everything up, with the tools below, check the form of the source, run all tests
+# make instructions  compare instruction counts of the kernels with bench/instructions.csv; needs valgrind
+# make lint   is the source formatted as .clang-format and pyproject.toml say, and without findings?
+# make format  format it
 # make tools  install other people's tools that the tests run FMUs in
 # make study  measure speed, accuracy and stability, write charts and tables to docs/study/
 # make sanitize  100,000 random sequences of calls under sanitizers (make test: 2,000)
 # make fuzz   60 s of fuzzing of resources, serialised states and scene files
 # make bench  time the kernels, the FMU calls and what grows with a scene, write bench/latest.csv and docs/bench.svg
-# Test and bench count instructions with valgrind: apt-get install valgrind
+# Bench counts instructions too.
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
@@ -15,12 +18,24 @@ SOURCES := CMakeLists.txt $(wildcard src/*.?pp modelDescription/*.?pp fmu/*.?pp 
 # Each set in an environment of its own; not compiled ahead, as most of their files are never imported.
 TOOLS := build/tools/importers/installed build/tools/cofmupy/installed
 
-.PHONY: demo test tools study sanitize fuzz bench valgrind clean
+.PHONY: demo test instructions lint format tools study sanitize fuzz bench valgrind clean
 demo: $(VENV)/installed
 	$(BIN)/tiefmu demo --out out
 
-test: $(VENV)/installed tools valgrind
+test: $(VENV)/installed tools lint
 	$(BIN)/python -m pytest -n 2
+
+instructions: $(VENV)/installed valgrind
+	$(BIN)/python -m pytest -m instructions
+
+CXX_FILES = $(shell find bench fmu modelDescription python src tests -name '*.?pp')
+lint: $(VENV)/installed
+	$(BIN)/clang-format --dry-run --Werror $(CXX_FILES)
+	$(BIN)/ruff format --quiet --check .
+
+format: $(VENV)/installed
+	$(BIN)/clang-format -i $(CXX_FILES)
+	$(BIN)/ruff format .
 
 study: $(VENV)/installed
 	$(BIN)/tiefmu study speed-accuracy scenes/*.toml --out docs/study
@@ -55,7 +70,7 @@ $(VENV)/built-with: pyproject.toml
 	touch $@
 
 $(VENV)/installed: $(VENV)/built-with $(SOURCES)
-	$(BIN)/python -m pip install --quiet --no-build-isolation --editable '.[test]'
+	$(BIN)/python -m pip install --quiet --no-build-isolation --editable '.[test,lint]'
 	touch $@
 
 tools: $(TOOLS)

@@ -280,7 +280,7 @@ def test_archive(weld, tmp_path):
         assert [info.filename for info in infos] == [
             f"binaries/{package.PLATFORM}/scene{package.SUFFIX}",
             "documentation/index.html",
-            *(f"documentation/licenses/{name}.txt" for name in ("cereal", "fmi", "license")),
+            *(f"documentation/licenses/{name}.txt" for name in ("cereal", "fmi", "license", "tiefmu")),
             "extra/tiefmu/reference_in.csv",
             "extra/tiefmu/reference_out.csv",
             "model.png",

@@ -127,6 +127,7 @@ def test_licences_name_what_is_compiled_in(files):
         assert part in text
     for name in re.findall(r"\w+\.txt", text):
         assert b"Copyright" in found[f"documentation/licenses/{name}"]
+    assert found["documentation/licenses/tiefmu.txt"] == (Path(__file__).parents[1] / "LICENSE").read_bytes()
 
 
 def table(data: bytes) -> np.ndarray:

@@ -13,6 +13,7 @@ CLOSE = 0.03
 FAR = 0.5  # another compiler or instruction set: only what would be wrong with any of them is seen
 
 
+@pytest.mark.instructions
 def test_a_cycle_takes_no_more_instructions_than_the_reference():
     expected, made_with = bench.reference()
     counts = bench.instructions(bench.program())

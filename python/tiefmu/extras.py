@@ -1,5 +1,6 @@
 """What an FMU carries beside model and binary (FMI 2.0.4, section 2.3): for people and for tools that connect FMUs."""
 
+from importlib.metadata import distribution
 from pathlib import Path
 
 from .extras_page import page
@@ -20,4 +21,12 @@ def extras(scene: Scene, found: dict, step: float) -> dict[str, bytes]:
         "terminalsAndIcons/terminalsAndIcons.xml": terminals(scene),
     }
     files |= {f"documentation/licenses/{path.name}": path.read_bytes() for path in LICENSES.glob("*.txt")}
+    files["documentation/licenses/tiefmu.txt"] = own_license().encode()
     return files | reference(scene, step)
+
+
+def own_license() -> str:
+    """The file LICENSE of the project, as installed."""
+    text = distribution("tiefmu").read_text("licenses/LICENSE")
+    assert text, "installed without its LICENSE"
+    return text
