@@ -1,5 +1,5 @@
 # make demo   set everything up, build the example scenes as FMUs, run them, write out/
-# make test   set everything up, with the tools below, check the form of the source, run all tests
+# make test   set everything up, with the tools below, run all tests
 # make instructions  compare instruction counts of the kernels with bench/instructions.csv; needs valgrind
 # make lint   is the source formatted as .clang-format and pyproject.toml say, and without findings?
 # make format  format it
@@ -22,7 +22,7 @@ TOOLS := build/tools/importers/installed build/tools/cofmupy/installed
 demo: $(VENV)/installed
 	$(BIN)/tiefmu demo --out out
 
-test: $(VENV)/installed tools lint
+test: $(VENV)/installed tools
 	$(BIN)/python -m pytest -n 2
 
 instructions: $(VENV)/installed valgrind
@@ -32,10 +32,12 @@ CXX_FILES = $(shell find bench fmu modelDescription python src tests -name '*.?p
 lint: $(VENV)/installed
 	$(BIN)/clang-format --dry-run --Werror $(CXX_FILES)
 	$(BIN)/ruff format --quiet --check .
+	$(BIN)/ruff check --quiet .
 
 format: $(VENV)/installed
 	$(BIN)/clang-format -i $(CXX_FILES)
 	$(BIN)/ruff format .
+	$(BIN)/ruff check --fix .
 
 study: $(VENV)/installed
 	$(BIN)/tiefmu study speed-accuracy scenes/*.toml --out docs/study
