@@ -291,7 +291,7 @@ def test_archive(weld, tmp_path):
         ]
         assert {info.date_time for info in infos} == {(1980, 1, 1, 0, 0, 0)}
         assert {info.compress_type for info in infos} == {zipfile.ZIP_DEFLATED}
-        assert [oct(info.external_attr >> 16) for info in infos] == ["0o755"] + ["0o644"] * 11
+        assert [oct(info.external_attr >> 16) for info in infos] == ["0o755"] + ["0o644"] * 12
         assert json.loads(archive.read("resources/report.json")) == found(weld)
 
 
