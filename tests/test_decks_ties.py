@@ -335,7 +335,7 @@ def test_a_slave_that_is_a_master_elsewhere(tmp_path):
     made = deck().surface(1, "PART", [1]).surface(2, "PART", [2]).node_group(1, [21]).node_group(2, [7])
     made.nodes({31: (5, 0, 0), 32: (6, 0, 0), 33: (5, 1, 0)}).surface(3, "SEG", [1, 31, 32, 33])
     made.node_group(3, [23]).tie(1, 2, 3, title="chain").tie(2, 3, 2, title="top")
-    with pytest.raises(decks.SceneError, match="node 7 is a slave here and a master of tie 'top'.*--tie"):
+    with pytest.raises(decks.SceneError, match=r"node 7 is a slave here and a master of tie 'top'.*--tie"):
         read(made, tmp_path)
 
 

@@ -31,6 +31,8 @@ class Nodal:
     stiffness: np.ndarray
     rotational_stiffness: np.ndarray
     rotations: np.ndarray
+    where: str = ""  # of the elements that are added, for messages
+    element: np.ndarray | None = None
 
     @staticmethod
     def zeros(n: int) -> "Nodal":
@@ -47,9 +49,20 @@ class Nodal:
         ):
             if np.ndim(value) == 1:
                 value = np.asarray(value)[:, None]
-            value = np.broadcast_to(value, nodes.shape)[given]
+            value = np.broadcast_to(value, nodes.shape)
+            if not np.all((value >= 0) & (value < np.inf)):
+                self.refuse(value)
+            value = value[given]
             if value.any():
                 target += np.bincount(nodes[given], weights=value, minlength=len(target))
+
+    def refuse(self, value: np.ndarray):
+        row = int(np.argmin(((value >= 0) & (value < np.inf)).all(axis=1)))
+        word = "negative" if value[row].min() < 0 else "infinite"
+        raise SceneError(
+            f"{self.where}: element {self.element[row]}: its mass or stiffness would be {word}: it has no area, volume "
+            "or length, or a value of its part is wrong"
+        )
 
 
 def nodal(deck: Deck, in_scene: np.ndarray | None = None) -> Nodal:
@@ -61,11 +74,13 @@ def nodal(deck: Deck, in_scene: np.ndarray | None = None) -> Nodal:
         for part, prop, material, members in deck.part_values(elements.part):
             some = Elements(kind, *(getattr(elements, key)[members] for key in ("id", "nodes", "part", "thickness")))
             where = f"{part.where or deck.file}: part {part.id}"
-            if kind == "spring":
-                held = np.zeros(len(members), bool) if in_scene is None else in_scene[members]
-                function(found, deck, some, prop, held)
-            else:
-                function(found, deck, some, part, prop, material, where)
+            found.where, found.element = where, some.id
+            with np.errstate(all="ignore"):
+                if kind == "spring":
+                    held = np.zeros(len(members), bool) if in_scene is None else in_scene[members]
+                    function(found, deck, some, prop, held)
+                else:
+                    function(found, deck, some, part, prop, material, where)
     for nodes, mass in deck.added_mass:
         np.add.at(found.mass, nodes, mass)
     for nodes, inertia in deck.added_inertia:
@@ -145,10 +160,9 @@ def shell3(found: Nodal, deck: Deck, some: Elements, part, prop, material, where
     area = 0.5 * np.linalg.norm(np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]), axis=1)
     side = np.stack([np.linalg.norm(x[:, (i + 2) % 3] - x[:, (i + 1) % 3], axis=1) for i in range(3)], axis=1)
     a, b, c = side.T  # opposite to corners 0, 1, 2
-    with np.errstate(all="ignore"):
-        cosines = np.stack([(b * b + c * c - a * a) / (2 * b * c), (a * a + c * c - b * b) / (2 * a * c)], axis=1)
+    cosines = np.stack([(b * b + c * c - a * a) / (2 * b * c), (a * a + c * c - b * b) / (2 * a * c)], axis=1)
     share = np.arccos(np.clip(cosines, -1, 1)) / np.pi
-    share = np.concatenate([share, 1 - share.sum(axis=1, keepdims=True)], axis=1)
+    share = np.concatenate([share, np.maximum(1 - share.sum(axis=1, keepdims=True), 0)], axis=1)
     mass = material.density * t * area
     z0 = prop.values.get("offset", 0.0)
     inertia = mass * (area / 4.5 + t * t * (1 / 12 + z0 * z0))
@@ -309,15 +323,14 @@ def spring(found: Nodal, deck: Deck, some: Elements, prop, in_scene: np.ndarray)
         kr = kr + max(values["stiffness"][1:]) / scale * length**2
         cr = cr + max(values["damping"][1:]) / scale * length**2
     out = ~in_scene
-    found.add(some.nodes[out], stiffness=damped_stiffness(k, c, mass)[out])
+    found.add(some.nodes, stiffness=np.where(out, damped_stiffness(k, c, mass), 0.0))
     if turning:
-        found.add(some.nodes[out], rotational_stiffness=damped_stiffness(kr, cr, inertia)[out])
+        found.add(some.nodes, rotational_stiffness=np.where(out, damped_stiffness(kr, cr, inertia), 0.0))
 
 
 def damped_stiffness(k: np.ndarray, c: np.ndarray, m: np.ndarray) -> np.ndarray:
     """(sqrt(c^2 + k m) + c)^2 / m: the stiffness whose undamped step with the mass m is that of k and c."""
-    with np.errstate(all="ignore"):
-        return np.where(m > 0, (np.sqrt(c * c + k * m) + c) ** 2 / m, k)
+    return np.where(m > 0, (np.sqrt(c * c + k * m) + c) ** 2 / m, k)
 
 
 FUNCTIONS = {

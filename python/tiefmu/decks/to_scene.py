@@ -6,6 +6,7 @@ decided here, and said in the deck's notes and warnings.
 
 import re
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 
@@ -54,7 +55,7 @@ def convert(deck: Deck, free: tuple[str, ...] = ()) -> Written:
     chosen = chosen[np.argsort(deck.node_id[chosen])]
     scale = Scale(deck)
     written = Written(
-        {"title": deck.title or f"Ties of {deck.file}"} | scale.table(),
+        {"title": deck.title or f"Ties of {Path(deck.file).name}"} | scale.table(),
         deck.node_id[chosen],
         scale.of("position", deck.position[chosen]),
         *segments_of(deck),

@@ -49,14 +49,14 @@ def read(path: Path, file: str, wanted: list[str] | None = None) -> Deck:
     deck.title = titles[0].lines[0].decode("utf-8", "replace").strip() if titles and titles[0].lines else ""
     node_blocks = of("NODE", "CNODE")
     for block in of("NODE", "CNODE"):
-        if len(block.key) > 1 and block.key[1].isdigit() and int(block.key[1]):
-            block.fail(f"its unit {block.key[1]} is not supported; give it in the units of /BEGIN")
+        if block.word(1).isdecimal() and block.word(1).strip("0"):
+            block.fail(f"its unit {block.word(1)} is not supported; give it in the units of /BEGIN")
     node_block = mesh.read_nodes(deck, node_blocks)
     subsets = mesh.read_parts(deck, of("PART"))
     unknown = tables.read_properties(deck, of("PROP"), default_shell(of("DEF_SHELL")))
     unread = tables.read_materials(deck, [b for b in of("MAT") if len(b.key) > 1])
     mesh.read_elements(deck, of(*mesh.ELEMENTS))
-    mesh.check_references(deck, set(), set())
+    mesh.check_references(deck)
     warn_of_tables(deck, unknown, unread)
     units.check(deck, begin, said)
 

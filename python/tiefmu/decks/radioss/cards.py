@@ -5,6 +5,7 @@ wide and reals 20 wide, in formats before 5.1 8 and 16 wide; the title of a bloc
 its first card since.
 """
 
+import math
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -14,6 +15,8 @@ from ..._core import SceneError
 from ...schema import shortened
 
 MOST_INCLUDES = 1000
+LARGEST_ID = 10**18
+UNDERSCORE = ord("_")
 
 
 @dataclass
@@ -82,18 +85,22 @@ class Block:
     def fail(self, text: str, card: int | None = None):
         raise SceneError(f"{self.where if card is None else self.at(card)}: {text}")
 
+    def word(self, place: int) -> str:
+        """The keyword's word at `place`, e.g. TYPE2; '' where it has none."""
+        return self.key[place].upper() if place < len(self.key) else ""
+
     def id(self, place: int, what: str) -> int:
         """The number at `place` of the keyword's words, with the submodel's offset for `what`."""
         word = self.key[place] if place < len(self.key) else ""
-        if not word.strip().isdigit():
+        if not word.isdecimal() or len(word) > 18:
             self.fail(f"expected an id in the keyword, found '{shortened(word)}'")
         return int(word) + getattr(self.offsets, what)
 
     def titled(self) -> tuple[str, "Cards"]:
         """The title, and the cards behind it."""
         if self.source.old:
-            words = [word for word in self.key[1:] if not word.strip().isdigit()]
-            return (words[-1].strip() if words and not self.key[-1].strip().isdigit() else ""), Cards(self, 0)
+            last = self.key[-1]
+            return ("" if len(self.key) < 2 or last.isdecimal() else last), Cards(self, 0)
         if not self.lines:
             self.fail("is cut off: no title")
         return self.lines[0].decode("utf-8", "replace").strip(), Cards(self, 1)
@@ -137,12 +144,7 @@ class Cards:
             try:
                 found.append(text if letter == "s" else (whole(text) if letter == "i" else real(text)))
             except ValueError:
-                kind = "a number" if letter == "r" else "a whole number"
-                self.block.fail(
-                    f"columns {start - width + 1} to {start}: expected {kind}, found '{shortened(text)}'"
-                    + ("; /PARAMETER is not supported" if text.startswith("&") else ""),
-                    self.first + card,
-                )
+                self.refuse(card, start - width, width, letter == "r", text)
         return found
 
     def table(self, integers: int, reals: int = 0, start: int = 0, step: int = 1, blank: int = 0):
@@ -187,22 +189,28 @@ class Cards:
         if dtype is float:
             text[(text == ord("D")) | (text == ord("d"))] = ord("e")
         column = text.reshape(-1).view(f"S{width}")
-        try:
-            return column.astype(dtype)
-        except (ValueError, OverflowError):
-            pass
+        if not (text == UNDERSCORE).any():  # NumPy takes 1_000, as Python does
+            try:
+                numbers = column.astype(dtype)
+                if np.all(np.abs(numbers) < (LARGEST_ID if dtype is np.int64 else np.inf)):
+                    return numbers
+            except (ValueError, OverflowError):
+                pass
         found = np.empty(len(column), dtype)
         for row, item in enumerate(column.tolist()):
             word = item.decode("latin-1").strip()
             try:
                 found[row] = whole(word) if dtype is np.int64 else real(word)
             except (ValueError, OverflowError):
-                kind = "a number" if dtype is float else "a whole number"
-                self.block.fail(
-                    f"columns {first + 1} to {first + width}: expected {kind}, found '{shortened(word)}'",
-                    self.first + int(index[row]),
-                )
+                self.refuse(int(index[row]), first, width, dtype is float, word)
         return found
+
+    def refuse(self, card: int, first: int, width: int, real: bool, word: str):
+        self.block.fail(
+            f"columns {first + 1} to {first + width}: expected {'a number' if real else 'a whole number'}, found "
+            f"'{shortened(word)}'" + ("; /PARAMETER is not supported" if word.startswith("&") else ""),
+            self.first + card,
+        )
 
     def ids(self, start: int = 0) -> np.ndarray:
         """All integers of all cards from `start` on, ten to a card, zeros left out; negative ones as they are."""
@@ -215,7 +223,7 @@ def whole(text: str) -> int:
     if not text:
         return 0
     number = int(text)
-    if abs(number) >= 2**62:
+    if abs(number) >= LARGEST_ID or "_" in text:
         raise ValueError
     return number
 
@@ -225,13 +233,18 @@ def real(text: str) -> float:
     if not text:
         return 0.0
     text = text.replace("D", "e").replace("d", "e")
+    if "_" in text:
+        raise ValueError
     try:
-        return float(text)
+        number = float(text)
     except ValueError:
         place = max(text.rfind("+"), text.rfind("-"))
-        if place > 0 and text[place - 1] not in "eE":
-            return float(f"{text[:place]}e{text[place:]}")
-        raise
+        if place <= 0 or text[place - 1] in "eE":
+            raise
+        number = float(f"{text[:place]}e{text[place:]}")
+    if not math.isfinite(number):
+        raise ValueError
+    return number
 
 
 def read(path: Path, file: str) -> list[Block]:
@@ -311,7 +324,12 @@ class Reader:
         """Words of the keyword //SUBMODEL; None for //ENDSUB."""
         if words[0] == "SUBMODEL":
             own = Offsets(**vars(self.offsets[-1]))
-            own.submodel = int(words[1]) if len(words) > 1 and words[1].isdigit() else 0
+            own.submodel = int(words[1]) if len(words) > 1 and words[1].isdecimal() and len(words[1]) < 19 else 0
+            if len(words) > 2 and words[2].strip("0"):
+                raise SceneError(
+                    f"{name}: line {number}: //SUBMODEL: its unit {shortened(words[2])} is not supported; give it in "
+                    "the units of /BEGIN"
+                )
             own.inside = (*own.inside, own.submodel)
             self.offsets.append(own)
             return words

@@ -33,7 +33,7 @@ def bcs(deck: Deck, sets: Sets, block: Block):
 
 
 def imposed(deck: Deck, sets: Sets, block: Block):
-    if len(block.key) > 1 and not block.key[1].isdigit():
+    if not (block.word(1) or "0").isdecimal():
         deck.warn(f"{block.where}: is left aside; nodes that it moves are not known to be moved")
         return
     _, cards = block.titled()
@@ -43,7 +43,7 @@ def imposed(deck: Deck, sets: Sets, block: Block):
 
 
 def rbody(deck: Deck, sets: Sets, block: Block):
-    if len(block.key) > 1 and not block.key[1].isdigit():
+    if not (block.word(1) or "0").isdecimal():
         deck.warn(f"{block.where}: is not understood; its nodes are treated as if it were not there")
         return
     title, cards = block.titled()
@@ -59,8 +59,8 @@ def rbody(deck: Deck, sets: Sets, block: Block):
 
 
 def admas(deck: Deck, sets: Sets, block: Block):
-    kind = block.key[1] if len(block.key) > 2 else "0"
-    if not kind.isdigit():
+    kind = block.word(1) if len(block.key) > 2 else "0"
+    if not kind.isdecimal():
         block.fail(f"expected a type from 0 to 7, found '{kind}'")
     kind, (_, cards) = int(kind), block.titled()
     if kind in (0, 1):
@@ -87,7 +87,7 @@ def admas(deck: Deck, sets: Sets, block: Block):
 
 
 def inivel(deck: Deck, sets: Sets, block: Block):
-    kind = block.key[1]
+    kind = block.word(1)
     _, cards = block.titled()
     if kind not in ("TRA", "ROT", "T+G"):
         if kind not in ("GRID", "FVM"):
@@ -145,7 +145,7 @@ def skews_of(blocks: list[Block]) -> dict[int, np.ndarray]:
     """/SKEW/FIX: id -> axes as rows (3, 3)."""
     found = {}
     for block in blocks:
-        if block.key[1] != "FIX":
+        if block.word(1) != "FIX":
             continue
         _, cards = block.titled()
         first = 1 if len([1 for i in range(len(cards)) if cards.need(i).strip()]) > 2 else 0

@@ -85,6 +85,8 @@ def read_elements(deck: Deck, blocks: list[Block]):
             first = int(np.argmax(missing.any(axis=1)))
             node = nodes[first][missing[first]][0]
             block.fail(f"element {ids[first]}: node {node} is not in the deck", int(index[first]))
+        if part not in deck.parts and len(ids):
+            block.fail(f"element {ids[0]}: part {part} is not in the deck", int(index[0]))
         found.setdefault(kind, []).append((ids, corners, np.full(len(ids), part), thickness, block))
     for kind, groups in found.items():
         columns = [np.concatenate([group[i] for group in groups]) for i in range(4)]
@@ -120,19 +122,14 @@ def read_parts(deck: Deck, blocks: list[Block]) -> dict[int, int]:
     return subsets
 
 
-def check_references(deck: Deck, unknown_properties: set[int], unknown_materials: set[int]):
-    """Parts of elements, properties and materials of parts exist."""
+def check_references(deck: Deck):
+    """Properties and materials of parts that have elements exist."""
     for elements in deck.elements.values():
         for number in np.unique(elements.part).tolist():
-            part = deck.parts.get(number)
-            if part is None:
-                first = elements.id[np.argmax(elements.part == number)]
-                keyword = next(key for key, value in ELEMENTS.items() if value[0] == elements.kind)
-                raise SceneError(f"{deck.file}: /{keyword}/{number}: element {first}: part {number} is not in the deck")
-            if part.property not in deck.properties and part.property not in unknown_properties:
+            part = deck.parts[number]
+            if part.property not in deck.properties:
                 raise SceneError(f"{part.where}: property {part.property} is not in the deck")
-            needs_material = elements.kind != "spring"
-            if needs_material and part.material not in deck.materials and part.material not in unknown_materials:
+            if elements.kind != "spring" and part.material not in deck.materials:
                 raise SceneError(f"{part.where}: material {part.material} is not in the deck")
 
 
@@ -140,7 +137,7 @@ def transform(deck: Deck, blocks: list[Block], node_block: np.ndarray, node_bloc
     """/TRANSFORM, submodels first as the starter does, then node groups. group(id, block): node indices."""
     moves = []
     for block in blocks:
-        kind = block.key[1] if len(block.key) > 1 else ""
+        kind = block.word(1)
         _, cards = block.titled()
         layout = {"TRA": "irrriii", "ROT": "irrriii", "SYM": "irrriii", "SCA": "irrriii", "MATRIX": "irrrri"}.get(kind)
         if layout is None:

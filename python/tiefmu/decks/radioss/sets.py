@@ -36,12 +36,12 @@ class Sets:
         self.open: list[tuple[str, int]] = []
         for block in blocks:
             name = block.key[0]
-            digits = [word for word in block.key[1:] if word.isdigit()]
+            digits = [word for word in block.key[1:] if word.isdecimal()]
             if not digits:
                 block.fail("expected an id in the keyword")
             number = int(digits[0]) + block.offsets.other
             same = self.blocks.setdefault((name, number), [])
-            if same and not (name == "SET" and block.key[1] == "COLLECT"):
+            if same and not (name == "SET" and block.word(1) == "COLLECT"):
                 block.fail(f"{name} {number} is repeated; the first one stands in {same[0].where}")
             same.append(block)
 
@@ -76,7 +76,7 @@ class Sets:
     def node_mask(self, block: Block) -> np.ndarray:
         if block.key[0] == "SET":
             return self.set_of(block).node_mask()
-        kind = block.key[1]
+        kind = block.word(1)
         _, cards = block.titled()
         mask = np.zeros(len(self.deck.node_id), bool)
         if kind == "GEN_INCR":
@@ -134,7 +134,7 @@ class Sets:
     def box_mask(self, block: Block) -> np.ndarray:
         """/BOX/RECTA, SPHER, CYLIN and boxes of boxes; by position."""
         x, (_, cards) = self.deck.position, block.titled()
-        kind = block.key[1] if not block.key[1].isdigit() else "RECTA"
+        kind = block.word(1) if not block.word(1).isdecimal() else "RECTA"
         if kind == "BOX":
             mask = np.zeros(len(x), bool)
             return combine(
@@ -203,9 +203,9 @@ class Sets:
 
     def grpart(self, block: Block) -> set[int]:
         _, cards = block.titled()
-        found = self.parts_named(block.key[1], cards.ids(), block)
+        found = self.parts_named(block.word(1), cards.ids(), block)
         if found is None:
-            block.fail(f"groups of parts by {block.key[1]} are not understood")
+            block.fail(f"groups of parts by {block.word(1)} are not understood")
         return found
 
     def elements_named(self, kind: str, ids: np.ndarray, block: Block) -> "Selected | None":
@@ -222,7 +222,7 @@ class Sets:
 
     def group(self, block: Block) -> "Selected":
         """Elements of a /GRSHEL and so on."""
-        kinds, kind = GROUPS[block.key[0]], block.key[1]
+        kinds, kind = GROUPS[block.key[0]], block.word(1)
         _, cards = block.titled()
         ids = cards.ids()
         if kind in SINGLE:
@@ -248,7 +248,7 @@ class Sets:
     def faces_of(self, block: Block) -> Faces:
         if block.key[0] == "SET":
             return self.set_of(block).faces()
-        kind = block.key[1]
+        kind = block.word(1)
         _, cards = block.titled()
         if kind == "SEG":
             rows, _, index = cards.table(5)
@@ -262,7 +262,7 @@ class Sets:
         selected = self.elements_named(kind, ids, block)
         if selected is None:
             block.fail(f"surfaces of type {kind} are not understood")
-        how = block.key[2].upper() if len(block.key) > 2 else ""
+        how = block.word(2)
         if how == "FREE":
             block.fail("surfaces of free faces are not understood")
         if kind == "GRBRIC" and how != "ALL":

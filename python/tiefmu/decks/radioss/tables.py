@@ -131,13 +131,13 @@ def read_properties(deck: Deck, blocks: list[Block], default_shell: tuple[int, i
     unknown = set()
     for block in blocks:
         number = block.id(2, "property")
-        kind = number_of(block.key[1], "TYPE", PROPERTY_NAMES)
+        kind = number_of(block.word(1), "TYPE", PROPERTY_NAMES)
         title, cards = block.titled()
         refuse_unit(block, 3)
         if number in deck.properties or number in unknown:
             first = deck.properties.get(number)
             block.fail(f"property {number} is repeated" + (f"; the first one stands in {first.where}" if first else ""))
-        name = block.key[1]
+        name = block.word(1)
         if kind in SHELL_TYPES:
             values = shell(cards, default_shell)
             found = Property(number, "shell", name, title, values, block.where)
@@ -166,8 +166,8 @@ def read_properties(deck: Deck, blocks: list[Block], default_shell: tuple[int, i
 
 def refuse_unit(block: Block, place: int):
     """A block in units of its own would be misread."""
-    if len(block.key) > place and block.key[place].isdigit() and not block.source.old and int(block.key[place]):
-        block.fail(f"its unit {block.key[place]} is not supported; give it in the units of /BEGIN")
+    if not block.source.old and block.word(place).isdecimal() and block.word(place).strip("0"):
+        block.fail(f"its unit {block.word(place)} is not supported; give it in the units of /BEGIN")
 
 
 def shell(cards: Cards, default_shell: tuple[int, int]) -> dict:
@@ -231,7 +231,7 @@ def read_materials(deck: Deck, blocks: list[Block]) -> set[int]:
     """/MAT: fills materials; returns ids of those whose elastic constants are not read."""
     unread = set()
     for block in blocks:
-        word = block.key[1] if len(block.key) > 1 else ""
+        word = block.word(1)
         law = number_of(word, "LAW", LAW_NAMES)
         number = block.id(2, "material")
         refuse_unit(block, 3)
