@@ -36,9 +36,11 @@ class Analysis {
   void collect(const List& list, int component, Dependence least, bool acrossClasses);
   void finishRow();
   void rows(const Block& block);
-  void nodeRows(const Block& block);
-  void slaveRows(const Block& block);
-  void portRows(const Block& block);
+  void vectorRows(const Block& block, const auto& collectLists);
+  void nodeRows(const Block& block, const auto& lists);
+  void slaveRows(const Block& block, const auto& list);
+  void portRows(const Block& block, const auto& list);
+  void uniformRows(const Block& block, bool all);
 
   const Model& model;
   const std::vector<Block>& blocks;
@@ -175,78 +177,86 @@ void Analysis::finishRow() {
   out.begin.push_back(out.entries.size());
 }
 
-void Analysis::nodeRows(const Block& block) {
-  const int first = static_cast<int>((block.place - layout[block.field].offset) / block.components);
-  const bool inertial = model.settings.reaction != Reaction::loads;
-  for (int e = 0; e < static_cast<int>(block.numbers.size()); ++e) {
-    const int node = first + e;
-    for (int k = 0; k < block.components; ++k) {
-      startRow();
-      const auto take = [&](const List& list) { collect(list, k, Dependence::constant, true); };
-      if (block.field == Field::addedMass) take(influences.addedMass[node]);
-      if (block.field == Field::addedInertia) take(influences.addedInertia[node]);
-      if (block.field == Field::reactionForce) {
-        take(influences.reactionForce[node]);
-        if (inertial) take(influences.inertialForce[node]);
-      }
-      if (block.field == Field::reactionMoment) {
-        take(influences.reactionMoment[node]);
-        if (inertial) take(influences.inertialMoment[node]);
-      }
-      finishRow();  // velocities and positions that are outputs are states, stiffnesses constants: empty rows
-    }
+// A row for each component of an unknown vector (or a scalar, in component 0).
+void Analysis::vectorRows(const Block& block, const auto& collectLists) {
+  for (int k = 0; k < block.components; ++k) {
+    startRow();
+    collectLists([&](const List& list) { collect(list, k, Dependence::constant, true); });
+    finishRow();
   }
 }
 
-void Analysis::slaveRows(const Block& block) {
-  List v, w, x, a;
+// lists(node, take): calls take with each list of what the node's unknown depends on.
+void Analysis::nodeRows(const Block& block, const auto& lists) {
+  const int first = static_cast<int>((block.place - layout[block.field].offset) / block.components);
+  for (int e = 0; e < static_cast<int>(block.numbers.size()); ++e)
+    vectorRows(block, [&](const auto& take) { lists(static_cast<std::size_t>(first + e), take); });
+}
+
+// list(segment, slave): what the slave's unknown depends on.
+void Analysis::slaveRows(const Block& block, const auto& list) {
   const int first = static_cast<int>((block.place - layout[block.field].offset) / block.components);
   const int last = first + static_cast<int>(block.numbers.size());
   influences.eachSegment([&](const Segment& s) {
     for (int slave = std::max(s.first, first); slave < std::min(s.last, last); ++slave) {
-      for (List* list : {&v, &w, &x, &a}) list->clear();
-      if (block.field == Field::slaveAcceleration)
-        influences.acceleration(s, slave, a);
-      else
-        influences.motion(s, slave, v, w, x);
-      const List& list = block.field == Field::slaveVelocity   ? v
-                         : block.field == Field::slaveSpin     ? w
-                         : block.field == Field::slavePosition ? x
-                                                               : a;
-      for (int k = 0; k < block.components; ++k) {
-        startRow();
-        collect(list, k, Dependence::constant, true);
-        finishRow();
-      }
+      const List found = list(s, slave);
+      vectorRows(block, [&](const auto& take) { take(found); });
     }
   });
 }
 
-void Analysis::portRows(const Block& block) {
-  const bool inertial = model.settings.reaction != Reaction::loads;
-  const bool driven = block.field == Field::portReaction || block.field == Field::portReactionMoment;
-  const bool known = block.field != Field::portPosition;  // which is a state
-  for (std::size_t e = 0; e < block.numbers.size(); ++e) {
-    Influences::Resultant sum;
-    if (known) sum = driven ? influences.resultant(e, inertial) : influences.means[e];
-    const bool first = block.field == Field::portReaction || block.field == Field::portMeanVelocity;
-    for (int k = 0; k < block.components; ++k) {
-      startRow();
-      collect(first ? sum.force : sum.moment, k, Dependence::constant, true);
-      finishRow();
-    }
+// list(port): what the port's unknown depends on.
+void Analysis::portRows(const Block& block, const auto& list) {
+  for (std::size_t port = 0; port < block.numbers.size(); ++port) {
+    const List found = list(port);
+    vectorRows(block, [&](const auto& take) { take(found); });
+  }
+}
+
+void Analysis::uniformRows(const Block& block, bool all) {
+  for (std::size_t i = 0; i < block.count(); ++i) {
+    startRow();
+    rowIsAll = all;
+    finishRow();
   }
 }
 
 void Analysis::rows(const Block& block) {
-  const bool unknown = block.causality == Causality::output || block.causality == Causality::calculatedParameter;
-  if (unknown && block.prefix == "port") return portRows(block);
-  if (unknown && block.prefix == "slave") return slaveRows(block);
-  if (unknown && !block.prefix.empty()) return nodeRows(block);
-  for (std::size_t i = 0; i < block.count(); ++i) {
-    startRow();
-    rowIsAll = unknown && block.field != Field::drift;  // sums over the whole model; offsets are states
-    finishRow();
+  if (block.causality == Causality::input || block.causality == Causality::parameter) return uniformRows(block, false);
+  const bool inertial = model.settings.reaction != Reaction::loads;
+  const auto motion = [&](List Influences::Motion::* part) {
+    return [this, part](const Segment& s, int slave) { return influences.motion(s, slave).*part; };
+  };
+  switch (block.dependsOn) {
+    case DependsOn::all: return uniformRows(block, true);
+    case DependsOn::nothing: return uniformRows(block, false);
+    case DependsOn::addedMass:
+      return nodeRows(block, [&](std::size_t node, const auto& take) { take(influences.addedMass[node]); });
+    case DependsOn::addedInertia:
+      return nodeRows(block, [&](std::size_t node, const auto& take) { take(influences.addedInertia[node]); });
+    case DependsOn::reactionForce:
+      return nodeRows(block, [&](std::size_t node, const auto& take) {
+        take(influences.reactionForce[node]);
+        if (inertial) take(influences.inertialForce[node]);
+      });
+    case DependsOn::reactionMoment:
+      return nodeRows(block, [&](std::size_t node, const auto& take) {
+        take(influences.reactionMoment[node]);
+        if (inertial) take(influences.inertialMoment[node]);
+      });
+    case DependsOn::slaveVelocity: return slaveRows(block, motion(&Influences::Motion::velocity));
+    case DependsOn::slaveSpin: return slaveRows(block, motion(&Influences::Motion::spin));
+    case DependsOn::slavePosition: return slaveRows(block, motion(&Influences::Motion::position));
+    case DependsOn::slaveAcceleration:
+      return slaveRows(block, [&](const Segment& s, int slave) { return influences.acceleration(s, slave); });
+    case DependsOn::portReaction:
+      return portRows(block, [&](std::size_t port) { return influences.resultant(port, inertial).force; });
+    case DependsOn::portReactionMoment:
+      return portRows(block, [&](std::size_t port) { return influences.resultant(port, inertial).moment; });
+    case DependsOn::portMeanVelocity:
+      return portRows(block, [&](std::size_t port) { return influences.means[port].force; });
+    case DependsOn::portMeanSpin:
+      return portRows(block, [&](std::size_t port) { return influences.means[port].moment; });
   }
 }
 

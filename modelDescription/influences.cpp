@@ -167,8 +167,9 @@ void Influences::corners(const Segment& s, int slave, CornerMap maps[4]) const {
   }
 }
 
-// Velocity, angular velocity and position of a slave.
-void Influences::motion(const Segment& s, int slave, List& v, List& w, List& x) const {
+Influences::Motion Influences::motion(const Segment& s, int slave) const {
+  Motion result;
+  auto& [v, w, x] = result;
   CornerMap maps[4];
   corners(s, slave, maps);
   const bool mean = s.group.coupling == Coupling::meanMotion;
@@ -178,7 +179,7 @@ void Influences::motion(const Segment& s, int slave, List& v, List& w, List& x) 
     addSpin(v, maps[i].vw, body);
     addVelocity(w, maps[i].wv, body);
     addSpin(w, maps[i].ww, body);
-    if (body >= model.nodes()) return;  // its place is a state
+    if (body >= model.nodes()) return result;  // its place is a state
     const std::uint32_t position = known(Field::position, body);
     add(x, mean && model.finite() ? identityPattern : maps[i].vv, position);
     if (mean && shapesChange) {
@@ -186,6 +187,7 @@ void Influences::motion(const Segment& s, int slave, List& v, List& w, List& x) 
       add(w, moving(fullPattern), position);
     }
   }
+  return result;
 }
 
 // How b of a slave (theory 2) depends on one corner: its translational part on v and w, its rotational part on v.
@@ -206,8 +208,8 @@ Influences::Bias Influences::bias(const Segment& s, int slave, int corner) const
   return b;
 }
 
-// T q'' + b
-void Influences::acceleration(const Segment& s, int slave, List& a) const {
+List Influences::acceleration(const Segment& s, int slave) const {
+  List a;
   CornerMap maps[4];
   corners(s, slave, maps);
   for (int i = 0; i < s.bodies; ++i) {
@@ -220,6 +222,7 @@ void Influences::acceleration(const Segment& s, int slave, List& a) const {
     if (s.group.coupling == Coupling::meanMotion && shapesChange && hasOffset(slave))
       add(a, moving(fullPattern), known(Field::position, body));
   }
+  return a;
 }
 
 void Influences::findSprings() {
@@ -228,22 +231,21 @@ void Influences::findSprings() {
   for (const Spring& spring : model.springs)
     for (const SpringEnd* end : {&spring.a, &spring.b})
       if (end->slave >= 0 && sprung[end->slave] < 0) sprung[end->slave] = count++;
-  std::vector<List> v(count), w(count), x(count);
+  std::vector<Motion> ends(static_cast<std::size_t>(count));
   eachSegment([&](const Segment& s) {
     for (int slave = s.first; slave < s.last; ++slave)
-      if (const int k = sprung[slave]; k >= 0) motion(s, slave, v[k], w[k], x[k]);
+      if (const int k = sprung[slave]; k >= 0) ends[static_cast<std::size_t>(k)] = motion(s, slave);
   });
   slaveForce.resize(count);
   slaveMoment.resize(count);
-  for (const Spring& spring : model.springs) addSpring(spring, v, w, x);
+  for (const Spring& spring : model.springs) addSpring(spring, ends);
   for (int node = model.freeBegin(); node < model.freeEnd(); ++node) {
     add(nodeForce[node], identityPattern, known(Field::nodeForce, node));
     add(nodeMoment[node], identityPattern, known(Field::nodeMoment, node));
   }
 }
 
-void Influences::addSpring(const Spring& spring, const std::vector<List>& v, const std::vector<List>& w,
-                           const std::vector<List>& x) {
+void Influences::addSpring(const Spring& spring, const std::vector<Motion>& ends) {
   struct Load { List force, moment; } a, b;
   const Pattern cross = moving(crossPattern), full = moving(fullPattern);
   const Pattern stiff = diagonalPattern(spring.stiffness), damped = diagonalPattern(spring.damping);
@@ -252,10 +254,10 @@ void Influences::addSpring(const Spring& spring, const std::vector<List>& v, con
   const bool bTurns =
       spring.b.slave >= 0 ? spring.b.slave < model.turning() : spring.b.node >= 0 && spring.b.node < model.rotating();
   for (const SpringEnd* end : {&spring.a, &spring.b}) {
-    List ev, ew, ex;
+    Motion of;
+    auto& [ev, ew, ex] = of;
     if (end->slave >= 0) {
-      const int k = sprung[end->slave];
-      ev = v[k], ew = w[k], ex = x[k];
+      of = ends[static_cast<std::size_t>(sprung[end->slave])];
     } else if (end->node >= 0) {
       addVelocity(ev, identityPattern, end->node);
       addSpin(ew, identityPattern, end->node);
@@ -398,13 +400,11 @@ void Influences::findMeans() {
     addSpin(means[k].force, turn, body);
     addSpin(means[k].moment, spin, body);
   }
-  List v, w, x;
   eachSegment([&](const Segment& s) {
     for (int slave = s.first; slave < s.last; ++slave) {
       const auto [port, index] = slavePort[static_cast<std::size_t>(slave)];
       if (port == none || slavePorts[port - first].body >= 0) continue;
-      for (List* list : {&v, &w, &x}) list->clear();
-      motion(s, slave, v, w, x);
+      const auto [v, w, x] = motion(s, slave);
       const CornerMap map = portMap(port, index);
       Resultant& mean = means[port - first];
       add(mean.force, map.vv, v);

@@ -62,8 +62,9 @@ class Influences {
 
   // Calls body(segment) in the order of slaves.
   template <class Body> void eachSegment(Body body) const;
-  void motion(const Segment& s, int slave, List& v, List& w, List& x) const;  // velocity, spin, position
-  void acceleration(const Segment& s, int slave, List& a) const;              // T q'' + b
+  struct Motion { List velocity, spin, position; };
+  Motion motion(const Segment& s, int slave) const;
+  List acceleration(const Segment& s, int slave) const;  // T q'' + b
 
   // Numbers above all references stand for the freedoms of free nodes' accelerations, which are unknowns themselves:
   // 6 a node, translations first.
@@ -99,8 +100,7 @@ class Influences {
 
   void findMembers();
   void findSprings();
-  void addSpring(const Spring& spring, const std::vector<List>& v, const std::vector<List>& w,
-                 const std::vector<List>& x);
+  void addSpring(const Spring& spring, const std::vector<Motion>& ends);
   void addPortLoads(int slave, List& force, List& moment) const;
   void findReactions();
   void findAdditions();

@@ -1,4 +1,4 @@
-// The one table of FMU variables. The XML, get and set, and the reports are written from it.
+// The FMU variables of a model.
 #pragma once
 
 #include <cstdint>
@@ -6,24 +6,24 @@
 #include <vector>
 
 #include "../src/simulation.hpp"
+#include "table.hpp"
 
 namespace tiefmu {
-
-enum class Causality { parameter, calculatedParameter, input, output };
 
 // A block: `numbers.size()` elements of `components` doubles each, contiguous in memory and in value references.
 // Variable k of element e is named prefix[numbers[e]].name[k+1] (components 3), prefix[numbers[e]].name (1), or just
 // `name` where prefix is empty. Ports have names in place of numbers: port[labels[e]].name[k+1]. Its value reference is
 // reference + e * components + k, its place in Simulation::data() is place + e * components + k.
 struct Block {
-  std::string prefix;  // "master", "slave", "point", "port" or ""
-  std::string name;    // "v", "f_ext", "stable_time_step", ...
-  int components = 1;  // 1 or 3
-  Causality causality = Causality::output;
-  std::string unit;         // one of the unit table, e.g. "m/s"
-  std::string description;  // without the id; "(node ID)" or "(port NAME)" is appended per element
-  Field field = Field::velocity;
-  std::size_t place = 0;
+  std::string_view prefix;  // "master", "slave", "point", "port" or ""
+  std::string_view name;    // "v", "f_ext", "stable_time_step", ...
+  int components;           // 1 or 3
+  Causality causality;
+  std::string_view unit;         // e.g. "m/s"
+  std::string_view description;  // without the id; "(node ID)" or "(port NAME)" is appended per element
+  DependsOn dependsOn;
+  Field field;
+  std::size_t place;
   std::vector<int> numbers;
   std::vector<std::int64_t> ids;    // node id per element; of ports their numbers
   std::vector<std::string> labels;  // of ports: their names
@@ -38,7 +38,7 @@ std::vector<Block> variables(const Model& model, const Layout& layout);
 std::string variableName(const Block& block, std::size_t element, int component);
 
 // Throws SceneError ("interface: expose: unknown name 'x'; known: ...") unless every name of settings.expose and
-// settings.hide is one of docs/interface.md.
+// settings.hide is one of table.hpp.
 void checkInterface(const Scene& scene);
 
 }  // namespace tiefmu

@@ -36,6 +36,16 @@ constexpr UnitRow units[] = {
     {"W", R"( kg="1" m="2" s="-3")", "Power"},
 };
 
+constexpr const UnitRow* unitRow(std::string_view name) {
+  for (const UnitRow& u : units)
+    if (name == u.name) return &u;
+  return nullptr;
+}
+
+static_assert(std::all_of(std::begin(variableRows), std::end(variableRows),
+                          [](const Variable& v) { return unitRow(v.row().unit) != nullptr; }),
+              "the unit of a variable is missing here");
+
 // The common validator takes 2 ms for each structured name.
 constexpr std::size_t mostStructuredNames = 10000;
 
@@ -97,7 +107,7 @@ struct Place {  // of an element in the listing
 std::vector<Place> listing(const std::vector<Block>& blocks) {
   std::vector<Place> places;
   for (std::uint32_t b = 0; b < blocks.size(); ++b) {
-    const std::string& prefix = blocks[b].prefix;
+    const std::string_view prefix = blocks[b].prefix;
     const int order = prefix.empty() ? 0 : prefix == "port" ? 1 : prefix == "master" ? 2 : prefix == "slave" ? 3 : 4;
     for (std::uint32_t e = 0; e < blocks[b].numbers.size(); ++e) places.push_back({order, blocks[b].numbers[e], b, e});
   }
@@ -183,8 +193,7 @@ void appendVariables(Out& to, const std::vector<Block>& blocks, const std::vecto
   std::string& out = to.text();
   std::vector<std::string> tails;  // what every variable of a block has in common, up to the start value
   for (const Block& b : blocks) {
-    const auto unit =
-        std::find_if(std::begin(units), std::end(units), [&](const UnitRow& u) { return b.unit == u.name; });
+    const UnitRow* unit = unitRow(b.unit);
     std::string tail = "\"";
     tail += causalityAttributes(b.causality);
     tail += std::string("><Real declaredType=\"") + unit->quantity + "\" unit=\"" + unit->name + "\"";

@@ -214,10 +214,10 @@ void Dynamics::directionalDerivative(double* derivative) {
     for (int s = 0; s < model.slaves(); ++s) kinetic += mass[s] * at(field(Field::slaveVelocity), s).dot(at(vs, s));
     for (int s = 0; s < model.turning(); ++s) kinetic += inertia[s] * at(field(Field::slaveSpin), s).dot(at(ws, s));
     double* e = seed(Field::energy);
-    e[0] = kinetic;
-    e[1] = strain;
-    e[2] = e[3] = 0;
-    e[4] = kinetic + strain;
+    e[Energy::kinetic] = kinetic;
+    e[Energy::strain] = strain;
+    e[Energy::dissipated] = e[Energy::external] = 0;  // sums over time
+    e[Energy::residual] = kinetic + strain;
   }
   if (has(Field::powerResidual)) {
     double sum = 0;

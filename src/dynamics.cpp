@@ -353,8 +353,9 @@ void Dynamics::distributeAll(const double* force, const double* moment, double* 
 void Dynamics::evaluateReactions() {
   gatherLoads();
   if (hasBias()) updateTurnRate(velocityFor(Field::predicted), spinFor(Field::predicted));
-  const Slice reactions = layout[Field::reactionForce];  // moments follow
-  eachBlock(reactions.count + layout[Field::reactionMoment].count, [&](std::size_t first, std::size_t last) {
+  static_assert(adjacent(Field::reactionForce, Field::reactionMoment));
+  const Slice reactions = layout.through(Field::reactionForce, Field::reactionMoment);
+  eachBlock(reactions.count, [&](std::size_t first, std::size_t last) {
     std::fill(data + reactions.offset + first, data + reactions.offset + last, 0.0);
   });
   distributeAll(slaveLoad_, slaveMoment_, field(Field::reactionForce), field(Field::reactionMoment));
@@ -521,7 +522,7 @@ void Dynamics::drift(double h, double ahead) {
 }
 
 void Dynamics::rates(double* rate) {
-  std::fill_n(rate, layout[Field::lagged].offset - layout[Field::velocity].offset, 0.0);
+  std::fill_n(rate, layout.through(Field::velocity, Field::work).count, 0.0);
   const auto of = [&](Field f) { return rate + (layout[f].offset - layout[Field::velocity].offset); };
   const double *v = field(Field::velocity), *w = field(Field::spin);
   const double *a = field(Field::acceleration), *z = field(Field::angularAcceleration);
@@ -560,8 +561,8 @@ void Dynamics::rates(double* rate) {
   }
   if (has(Field::work)) {
     const Power p = power();
-    of(Field::work)[0] = p.external;
-    of(Field::work)[1] = p.dissipated;
+    of(Field::work)[Work::external] = p.external;
+    of(Field::work)[Work::dissipated] = p.dissipated;
   }
 }
 
@@ -619,11 +620,12 @@ void Dynamics::updateOutputs() {
   if (has(Field::energy)) {
     const double* work = field(Field::work);
     double* e = field(Field::energy);
-    e[0] = kineticEnergy();
-    e[1] = strain_;
-    e[2] = work[1];
-    e[3] = work[0];
-    e[4] = e[0] + e[1] + e[2] - e[3] - work[2];
+    e[Energy::kinetic] = kineticEnergy();
+    e[Energy::strain] = strain_;
+    e[Energy::dissipated] = work[Work::dissipated];
+    e[Energy::external] = work[Work::external];
+    e[Energy::residual] =
+        e[Energy::kinetic] + e[Energy::strain] + e[Energy::dissipated] - e[Energy::external] - work[Work::totalAtStart];
   }
   if (has(Field::powerResidual)) {
     double sum = 0;

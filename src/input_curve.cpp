@@ -6,7 +6,7 @@ void InputCurve::set(std::size_t place, int order, double value, const Layout& l
   index_.resize(layout.size);
   int& index = index_[place];
   if (index == 0) {
-    const auto in = [&](Field f) { return place >= layout[f].offset && place < layout[f].offset + layout[f].count; };
+    const auto in = [&](Field f) { return layout[f].holds(place); };
     entries_.push_back(
         {{place, 0, 0}, in(Field::velocity) || in(Field::spin) || in(Field::portVelocity) || in(Field::portSpin), 0});
     index = static_cast<int>(entries_.size());

@@ -7,12 +7,12 @@ namespace tiefmu {
 Integrator::Integrator(Dynamics& dynamics) : dynamics_(dynamics) {
   const Layout& layout = dynamics.layout;
   if (dynamics.model.settings.method == Method::rk4) {
-    start_.resize(layout[Field::lagged].offset - layout[Field::velocity].offset);
+    start_.resize(layout.through(Field::velocity, Field::work).count);
     rates_.resize(start_.size());
     sum_.resize(start_.size());
   }
   if (dynamics.model.settings.method == Method::nohBathe)
-    earlier_.resize(layout[Field::acceleration].count + layout[Field::angularAcceleration].count);
+    earlier_.resize(layout.through(Field::acceleration, Field::angularAcceleration).count);
 }
 
 bool Integrator::step(double tau, double h) {
@@ -38,7 +38,8 @@ bool Integrator::step(double tau, double h) {
       return false;
     case Method::nohBathe: {
       const double h1 = nohBathe::p * h, h2 = (1 - nohBathe::p) * h;
-      double* a = d.field(Field::acceleration);  // angular accelerations follow
+      static_assert(adjacent(Field::acceleration, Field::angularAcceleration));
+      double* a = d.field(Field::acceleration);  // both
       d.inputsOver(tau, h1);
       d.drift(h1, 0.5 * h1);
       d.inputsAt(tau, h1);
@@ -67,7 +68,8 @@ bool Integrator::step(double tau, double h) {
 
 void Integrator::rungeKutta(double tau, double h) {
   Dynamics& d = dynamics_;
-  double* y = d.field(Field::velocity);
+  static_assert(allAre(Field::velocity, Field::work, Role::motion, Role::state));
+  double* y = d.field(Field::velocity);  // through work
   const std::size_t size = start_.size();
   std::copy_n(y, size, start_.begin());
   static constexpr double ahead[] = {0.5, 0.5, 1}, weight[] = {1, 2, 2, 1};

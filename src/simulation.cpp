@@ -32,8 +32,8 @@ struct Simulation::Impl {
   Dynamics dynamics;
   Integrator integrator;
   Spectrum spectrum;
-  // What a step changes and cannot compute anew: the fields velocity .. bounds (all driven: position .. work), without
-  // offsets where they follow from the segments' rotations.
+  // What a step changes and cannot compute anew: the fields velocity .. integratorLimit (all driven: position .. work),
+  // without offsets where they follow from the segments' rotations.
   std::vector<double> backup;
   Slice kept[2];
   double time = 0;
@@ -59,10 +59,11 @@ struct Simulation::Impl {
     if (model->anyFree()) {
       const bool own = std::any_of(model->groups.begin(), model->groups.end(),
                                    [](const TieGroup& g) { return g.coupling == Coupling::rotation; });
-      const std::size_t first = layout[Field::velocity].offset, last = layout[Field::slaveVelocity].offset;
-      const std::size_t split = layout[Field::offset].offset, resume = split + (own ? 0 : layout[Field::offset].count);
-      kept[0] = {first, split - first};
-      kept[1] = {resume, last - resume};
+      static_assert(allAre(Field::velocity, Field::position, Role::motion));
+      static_assert(adjacent(Field::position, Field::offset) && adjacent(Field::offset, Field::segmentRotation));
+      static_assert(allAre(Field::offset, Field::integratorLimit, Role::state));
+      kept[0] = layout.through(Field::velocity, Field::position);
+      kept[1] = layout.through(own ? Field::offset : Field::segmentRotation, Field::integratorLimit);
       backup.resize(kept[0].count + kept[1].count);
     }
     // An all-driven scene loses what it cannot compute anew only where a segment collapses.
@@ -71,10 +72,9 @@ struct Simulation::Impl {
     if (!model->anyFree() && frames && model->finite()) {
       const bool own = std::any_of(model->groups.begin(), model->groups.end(),
                                    [](const TieGroup& g) { return g.coupling == Coupling::rotation; });
-      const Slice last = layout[Field::work], rotation = layout[Field::segmentRotation];
-      kept[0] = {layout[Field::position].offset,
-                 layout[Field::position].count + (own ? layout[Field::offset].count : 0)};
-      kept[1] = {rotation.offset, last.offset + last.count - rotation.offset};
+      static_assert(allAre(Field::segmentRotation, Field::work, Role::state));
+      kept[0] = layout.through(Field::position, own ? Field::offset : Field::position);
+      kept[1] = layout.through(Field::segmentRotation, Field::work);
       backup.resize(kept[0].count + kept[1].count);
     }
     for (int s = 0; s < 3 * model->turning(); ++s) integrates |= model->finite() && model->slaveOffset[s] != 0;
@@ -82,7 +82,7 @@ struct Simulation::Impl {
 
   double* field(Field f) { return data.data() + layout[f].offset; }
 
-  double methodLimit() { return field(Field::bounds)[3]; }
+  double methodLimit() { return *field(Field::integratorLimit); }
   double stepLimit() {
     const double limit = *field(Field::safety) * methodLimit();
     const double asked = *field(Field::timeStep);
@@ -91,30 +91,30 @@ struct Simulation::Impl {
   }
 
   void computeLimits() {
-    double* bounds = field(Field::bounds);
-    std::fill_n(bounds, layout[Field::bounds].count, 0.0);
+    double &frequency = *field(Field::highestFrequency), &damping = *field(Field::dampingRate);
+    frequency = damping = *field(Field::angleTurned) = 0;
     *field(Field::nodalTimeStep) = nodalStep(*model, field(Field::addedMass), field(Field::addedInertia),
                                              field(Field::stiffness), field(Field::rotationalStiffness));
     if (model->anyFree() && !model->springs.empty()) {
-      bounds[0] = std::sqrt(spectrum.largest(false, layout[Field::mode].count ? field(Field::mode) : nullptr).bound());
-      if (dampers) bounds[1] = spectrum.largest(true, nullptr).bound();
+      frequency = std::sqrt(spectrum.largest(false, layout[Field::mode].count ? field(Field::mode) : nullptr).bound());
+      if (dampers) damping = spectrum.largest(true, nullptr).bound();
     }
     setLimits();
   }
 
   void setLimits() {
-    double* bounds = field(Field::bounds);
-    *field(Field::stableTimeStep) = bounds[0] > 0 ? 2 / bounds[0] : none;
-    bounds[3] = stableStep(model->settings.method, bounds[0], bounds[1]);
+    const double frequency = *field(Field::highestFrequency);
+    *field(Field::stableTimeStep) = frequency > 0 ? 2 / frequency : none;
+    *field(Field::integratorLimit) = stableStep(model->settings.method, frequency, *field(Field::dampingRate));
   }
 
   // Geometry changes the limit; the mode of the last look is where the next one starts.
   void refreshLimits() {
-    field(Field::bounds)[2] = 0;
+    *field(Field::angleTurned) = 0;
     if (layout[Field::mode].count == 0) return;
     const Spectrum::Value value = spectrum.refresh(field(Field::mode));
     if (value.ritz > 0 && std::isfinite(value.bound())) {
-      *field(Field::bounds) = std::sqrt(value.bound());
+      *field(Field::highestFrequency) = std::sqrt(value.bound());
       setLimits();
     }
   }
@@ -152,12 +152,12 @@ struct Simulation::Impl {
     double* work = field(Field::work);
     const double total = totalEnergy();
     if (!(flags & energyStarted)) {
-      work[2] = total;
+      work[Work::totalAtStart] = total;
       flags |= energyStarted;
     } else if (model->settings.reaction == Reaction::loads && model->anyDriven()) {
-      work[0] += total - work[3];
+      work[Work::external] += total - work[Work::totalAtLastStep];
     }
-    work[3] = total;
+    work[Work::totalAtLastStep] = total;
   }
 
   bool allWithin(std::size_t count, const double* value, double limit) {
@@ -262,9 +262,9 @@ struct Simulation::Impl {
     if (!energy) return;
     dynamics.evaluateReactions();
     const Dynamics::Power after = dynamics.power();
-    field(Field::work)[0] += 0.5 * duration * (before.external + after.external);
-    field(Field::work)[1] += 0.5 * duration * (before.dissipated + after.dissipated);
-    field(Field::work)[3] = totalEnergy();
+    field(Field::work)[Work::external] += 0.5 * duration * (before.external + after.external);
+    field(Field::work)[Work::dissipated] += 0.5 * duration * (before.dissipated + after.dissipated);
+    field(Field::work)[Work::totalAtLastStep] = totalEnergy();
   }
 
   void integrate(double duration) {
@@ -300,13 +300,13 @@ struct Simulation::Impl {
           evaluate();
           const Dynamics::Power after = dynamics.power();
           if (model->settings.method != Method::rk4) {  // which integrates them with the rest
-            field(Field::work)[0] += 0.5 * h * (before.external + after.external);
-            field(Field::work)[1] += 0.5 * h * (before.dissipated + after.dissipated);
+            field(Field::work)[Work::external] += 0.5 * h * (before.external + after.external);
+            field(Field::work)[Work::dissipated] += 0.5 * h * (before.dissipated + after.dissipated);
           }
           before = after;
         }
         if (substeps % checkEvery == 0) checkFinite();
-        double& turned = field(Field::bounds)[2];
+        double& turned = *field(Field::angleTurned);
         turned += h * dynamics.turnRate();
         if (substeps % refreshEvery == 0 || turned > refreshTurn) refreshLimits();
         if (stepLimit() < h * (1 - 1e-9)) break;
@@ -318,7 +318,7 @@ struct Simulation::Impl {
     if (dynamics.has(Field::position)) checkPlaces(0);
     checkPorts(0);
     checkSegments();
-    if (energy) field(Field::work)[3] = totalEnergy();
+    if (energy) field(Field::work)[Work::totalAtLastStep] = totalEnergy();
   }
 };
 
@@ -485,9 +485,10 @@ void Simulation::save(State& state) const {
 void Simulation::restore(const State& state) {
   Impl& s = *impl_;
   // What `prepare` keeps beside the array depends on the slaves' masses only.
-  const Slice first = s.layout[Field::slaveMass], last = s.layout[Field::slaveInertia];
-  const bool sameMasses = std::equal(state.data.begin() + first.offset, state.data.begin() + last.offset + last.count,
-                                     s.data.begin() + first.offset);
+  static_assert(adjacent(Field::slaveMass, Field::slaveInertia));
+  const Slice masses = s.layout.through(Field::slaveMass, Field::slaveInertia);
+  const bool sameMasses =
+      std::equal(state.data.begin() + masses.offset, state.data.begin() + masses.end(), s.data.begin() + masses.offset);
   std::copy(state.data.begin(), state.data.end(), s.data.begin());
   s.time = state.time;
   s.substeps = state.substeps;

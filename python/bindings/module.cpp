@@ -5,6 +5,7 @@
 #include <nanobind/stl/array.h>
 #include <nanobind/stl/shared_ptr.h>
 #include <nanobind/stl/string.h>
+#include <nanobind/stl/string_view.h>
 #include <nanobind/stl/vector.h>
 
 #include <memory>
@@ -308,60 +309,6 @@ nb::dict report(const Model& model) {
 
 // ---- Simulation
 
-struct FieldName {
-  Field field;
-  const char* name;
-  std::size_t components;
-};
-
-// The fields that mean something outside the solver.
-constexpr FieldName fieldNames[] = {
-    {Field::timeStep, "time_step", 1},
-    {Field::safety, "safety", 1},
-    {Field::threads, "threads", 1},
-    {Field::slaveMass, "slave_mass", 1},
-    {Field::slaveInertia, "slave_inertia", 1},
-    {Field::addedMass, "added_mass", 1},
-    {Field::addedInertia, "added_inertia", 1},
-    {Field::stiffness, "stiffness", 1},
-    {Field::rotationalStiffness, "rotational_stiffness", 1},
-    {Field::nodeForce, "node_force", 3},
-    {Field::nodeMoment, "node_moment", 3},
-    {Field::slaveForce, "slave_force", 3},
-    {Field::slaveMoment, "slave_moment", 3},
-    {Field::acceleration, "acceleration", 3},
-    {Field::angularAcceleration, "angular_acceleration", 3},
-    {Field::velocity, "velocity", 3},
-    {Field::spin, "spin", 3},
-    {Field::position, "position", 3},
-    {Field::offset, "offset", 3},
-    {Field::segmentRotation, "segment_rotation", 4},
-    {Field::orientation, "orientation", 4},
-    {Field::portForce, "port_force", 3},
-    {Field::portMoment, "port_moment", 3},
-    {Field::portVelocity, "port_velocity", 3},
-    {Field::portSpin, "port_spin", 3},
-    {Field::portAcceleration, "port_acceleration", 3},
-    {Field::portAngularAcceleration, "port_angular_acceleration", 3},
-    {Field::portPlace, "port_place", 3},
-    {Field::portRotation, "port_rotation", 4},
-    {Field::portReaction, "port_reaction", 3},
-    {Field::portReactionMoment, "port_reaction_moment", 3},
-    {Field::portMeanVelocity, "port_mean_velocity", 3},
-    {Field::portMeanSpin, "port_mean_spin", 3},
-    {Field::slaveVelocity, "slave_velocity", 3},
-    {Field::slaveSpin, "slave_spin", 3},
-    {Field::reactionForce, "reaction_force", 3},
-    {Field::reactionMoment, "reaction_moment", 3},
-    {Field::slavePosition, "slave_position", 3},
-    {Field::slaveAcceleration, "slave_acceleration", 3},
-    {Field::energy, "energy", 1},
-    {Field::powerResidual, "power_residual", 1},
-    {Field::drift, "drift", 1},
-    {Field::stableTimeStep, "stable_time_step", 1},
-    {Field::nodalTimeStep, "nodal_time_step", 1},
-};
-
 // A simulation with the FMU's view of it: fields by the names above, variables by their FMU names.
 class Run {
  public:
@@ -369,17 +316,17 @@ class Run {
       : simulation(std::move(model)), blocks(tiefmu::variables(simulation.model(), simulation.layout())) {}
 
   nb::object get(const std::string& name) {
-    const FieldName& f = find(name);
+    const FieldRow& f = find(name);
     simulation.updateOutputs();
     const Slice slice = simulation.layout()[f.field];
     std::vector<double> values(simulation.field(f.field), simulation.field(f.field) + slice.count);
-    if (f.components == 1) return numpy(std::move(values));
-    const std::size_t rows = slice.count / f.components;
-    return numpy(std::move(values), {rows, f.components});
+    if (f.components == 1 || f.per == Per::simulation) return numpy(std::move(values));
+    const auto components = static_cast<std::size_t>(f.components);
+    return numpy(std::move(values), {slice.count / components, components});
   }
 
   void set(const std::string& name, const Values& values) {
-    const FieldName& f = find(name);
+    const FieldRow& f = find(name);
     const Slice slice = simulation.layout()[f.field];
     require(values.size() == slice.count, "field '" + name + "' has " + std::to_string(slice.count) + " values, not " +
                                               std::to_string(values.size()));
@@ -389,7 +336,7 @@ class Run {
 
   nb::dict fields() const {
     nb::dict d;
-    for (const FieldName& f : fieldNames)
+    for (const FieldRow& f : fieldRows)
       if (const std::size_t count = simulation.layout()[f.field].count) d[f.name] = count;
     return d;
   }
@@ -417,7 +364,9 @@ class Run {
     nb::list result;
     for (const Block& b : blocks) {
       nb::dict d;
-      d["name"] = b.prefix.empty() ? b.name : b.prefix + "." + b.name;
+      std::string name(b.prefix);
+      if (!name.empty()) name += '.';
+      d["name"] = name.append(b.name);
       d["prefix"] = b.prefix;
       d["components"] = b.components;
       d["causality"] = causalities[static_cast<int>(b.causality)];
@@ -435,13 +384,15 @@ class Run {
   Simulation simulation;
 
  private:
-  static const FieldName& find(const std::string& name) {
-    for (const FieldName& f : fieldNames)
+  static const FieldRow& find(const std::string& name) {
+    for (const FieldRow& f : fieldRows)
       if (name == f.name) return f;
     throw nb::key_error(("no field '" + name + "'").c_str());
   }
 
-  void changed(Field f) { f < Field::addedMass ? simulation.parametersChanged() : simulation.inputsChanged(); }
+  void changed(Field f) {
+    rowOf(f).role == Role::parameter ? simulation.parametersChanged() : simulation.inputsChanged();
+  }
 
   // Block of the variable and its place in the data.
   std::pair<const Block*, std::size_t> place(const std::string& name) {
