@@ -52,7 +52,8 @@ def read_into(mesh: Mesh, path: Path, name: str):
     try:
         if not path.is_file():
             raise SceneError("no such file")
-        file = read(path)
+        with np.errstate(all="ignore"):  # what is not finite, or becomes so when turned, is found below
+            file = read(path)
         bad = np.flatnonzero(~np.isfinite(file.position).all(axis=1))
         if len(bad):
             raise SceneError(f"node {file.node_id[bad[0]]}: a coordinate is not a finite number")

@@ -312,7 +312,7 @@ def records(lines: list[str], count: int | None, quads: bool) -> tuple[np.ndarra
     width = max(map(len, rows))
     columns = [[row[k] if len(row) > k else "0" for row in rows] for k in range(width)]
     ids = whole(columns[0])
-    nodes = np.zeros((len(rows), width - 1), np.int64)
+    nodes = np.zeros((len(rows), max(width - 1, count or 1)), np.int64)
     for k, column in enumerate(columns[1:]):
         nodes[:, k] = [int(item) for item in column]
     if nodes.min(initial=0) < 0:

@@ -170,7 +170,8 @@ class Mesh:
             elif wanted in file.element_sets:
                 index = self.nodes_of_ids(self.nodes_of_rows(file.element_sets[wanted]))
             elif wanted in file.face_sets:
-                index = np.unique(self.segments[self.segments_of_faces(*file.face_sets[wanted])])
+                faces_of_set = self.segments_of_faces(*file.face_sets[wanted])  # may add to self.segments
+                index = np.unique(self.segments[faces_of_set])
                 index = index[index >= 0]
             else:
                 instance, _, number = wanted.rpartition(".")

@@ -114,7 +114,11 @@ def groups(families, kind: str) -> dict[str, list[int]]:
         if "GRO" not in family:
             continue
         for row in np.asarray(family["GRO"]["NOM"][()]).astype(np.uint8).reshape(-1, 80):
-            name = bytes(row.tolist()).split(b"\0")[0].decode("utf-8", "replace").strip()
+            text = bytes(row.tolist()).split(b"\0")[0]
+            try:
+                name = text.decode().strip()
+            except UnicodeDecodeError:
+                name = text.decode("latin-1").strip()
             if name:
                 found.setdefault(name, []).append(int(family.attrs["NUM"]))
     return found

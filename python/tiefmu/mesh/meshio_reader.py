@@ -8,6 +8,7 @@ behind the colon (medit:ref, su2:tag, ...) and the number.
 import contextlib
 import io
 import re
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -24,7 +25,8 @@ def read(path: Path) -> MeshFile:
 
     said = io.StringIO()
     try:  # meshio prints, and ends the program, where it cannot read
-        with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
+        with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said), warnings.catch_warnings():
+            warnings.simplefilter("ignore")
             mesh = meshio.read(path)
     except ImportError as error:
         raise needed(error) from None

@@ -211,7 +211,7 @@ def sets(file: MeshFile, cards, control: list[str]):
     nodes: dict[str, list[np.ndarray]] = {}
     members: dict[str, list[np.ndarray]] = {}
     text = "\n".join(control)
-    for match in re.finditer(r"(?im)^\s*SET\s+(\d+)\s*=\s*(.*(?:,\s*\n.*)*)", text):
+    for match in re.finditer(r"(?im)^\s*SET\s+(\d+)\s*=((?:.*,\s*\n)*.*)", text):
         ids = listed(re.sub(r"[,\s]+", " ", match[2]).split(), f"SET {match[1]}")
         nodes.setdefault(match[1], []).append(ids)
         members.setdefault(match[1], []).append(ids)
