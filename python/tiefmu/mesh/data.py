@@ -300,11 +300,11 @@ class Mesh:
         second = np.array([b.nodes.shape[1] > CORNERS.get(b.shape, 99) for b in self.content.blocks], bool)
         step = self.face_step()
         largest = int(self.element_id.max(initial=0))
-        if len(order) and int(numbers.max()) * step + largest >= 2**63:
-            raise SceneError(f"element {largest}: its id is too large for its faces to be numbered")
-        self.append_segments(
-            numbers[order] * step + self.element_id[rows[order]], corners[order], second[self.block_of[rows[order]]]
-        )
+        if len(order):
+            if int(numbers.max()) * step + largest >= 2**63:
+                raise SceneError(f"element {largest}: its id is too large for its faces to be numbered")
+            ids = numbers[order] * step + self.element_id[rows[order]]
+            self.append_segments(ids, corners[order], second[self.block_of[rows[order]]])
         self.face_keys = np.concatenate([self.face_keys, keys[new]])
         return len(self.segment_id) - len(self.face_keys) + find(self.face_keys, keys)
 
@@ -314,8 +314,8 @@ class Mesh:
 
     def segments_of_ids(self, where: str, wanted: list[int]) -> np.ndarray:
         index = find(self.segment_id, np.array(wanted, np.int64))
-        if (index < 0).any() and len(self.solid_rows(np.arange(len(self.element_id)))):
-            solids = self.solid_rows(np.arange(len(self.element_id)))
+        solids = self.solid_rows(np.arange(len(self.element_id)))
+        if (index < 0).any() and len(solids) and self.face_step() < 2**63:
             number, element = np.divmod(np.array(wanted, np.int64)[index < 0], self.face_step())
             place = find(self.element_id[solids], element)
             place = place[(place >= 0) & (number > 0)]
