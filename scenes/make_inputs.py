@@ -56,9 +56,22 @@ def heavy_slave():
     write("heavy_slave_split", velocity | acceleration | pull)
 
 
+def pin_weld():
+    # 2 ms: the upper sheet's quad lifts, rolls about its edge y = 0 and shears.
+    t = np.linspace(0, 2e-3, 201)
+    lift, roll, shear = bump(t, 0, 1e-3), bump(t, 0.2e-3, 1e-3), bump(t, 1.0e-3, 0.8e-3)
+    columns = {"time": t}
+    for i, y in ((5, 0), (6, 0), (7, 0.01), (8, 0.01)):  # nodes 15, 16, 18, 19
+        columns[f"master[{i}].v[3]"] = 0.05 * lift + 5 * roll * y
+        columns[f"master[{i}].v[1]"] = 0.05 * shear
+        columns[f"master[{i}].w[1]"] = 5 * roll
+    write("pin_weld", columns)
+
+
 RIVET_MASTERS = (1, 2, 3, 4)  # nodes 6, 7, 10, 11
 
 if __name__ == "__main__":
     spotweld()
     rivet()
     heavy_slave()
+    pin_weld()

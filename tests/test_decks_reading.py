@@ -1,11 +1,15 @@
 """How Radioss starter decks are written: formats, comments, includes, submodels, transformations, units."""
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 from deck_cards import RadiossDeck
 from tiefmu import decks
 from tiefmu.decks import radioss
 from tiefmu.decks.element_properties import nodal
+from tiefmu.decks.radioss import keywords, ties
 
 PLATE = {1: (0, 0, 0), 2: (1, 0, 0), 3: (1, 1, 0), 4: (0, 1, 0)}
 PIN = {11: (0.25, 0.5, 0.0)}
@@ -228,3 +232,12 @@ def test_decks_are_recognised_by_their_first_line(tmp_path):
     (tmp_path / "b.toml").write_text("#RADIOSS STARTER\n")
     assert not decks.is_deck(tmp_path / "b.toml")
     assert np.array_equal(decks.read(tmp_path / "a.k").deck.node_id, [1, 2, 3, 4, 11])
+
+
+def test_the_page_names_every_keyword():
+    page = (Path(__file__).parents[1] / "docs/decks.md").read_text()
+    named = set(re.findall(r"`/+([A-Z0-9_]+)", page))
+    known = keywords.USED | set().union(*keywords.SAFE.values()) | set(keywords.MATTERS)
+    assert named - {"END"} == known
+    for flag in (*ties.FORMULATIONS, *ties.REFUSED):
+        assert re.search(rf"Spotflag [\d, ]*\b{flag}\b", page), flag

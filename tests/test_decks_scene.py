@@ -1,6 +1,7 @@
 """What becomes of a deck's ties: motions, springs, masses, ports, start, gravity; the files; the FMU."""
 
 import csv
+from pathlib import Path
 
 import fmpy
 import fmpy.validation
@@ -11,6 +12,7 @@ from tiefmu import decks, scene
 from tiefmu.package import build
 from tiefmu.report import report
 
+HERE = Path(__file__).parent
 PLATE = {1: (0, 0, 0), 2: (2, 0, 0), 3: (2, 1, 0), 4: (0, 1, 0)}
 PIN = {11: (0.5, 0.5, 0.1), 12: (0.5, 0.5, 0.4), 13: (1.5, 0.5, 0.1)}
 
@@ -277,9 +279,20 @@ def test_import_on_the_command_line(tmp_path, command):
     assert found.returncode != 0 and "did you mean 'weld'" in found.stderr and "Traceback" not in found.stderr
 
 
-def test_a_built_deck_runs_in_fmpy(tmp_path):
-    path = everything().write(tmp_path / "deck_0000.rad")
-    fmu = build(scene.load(path), tmp_path / "deck.fmu")
+def run_in_fmpy(path, tmp_path, **options):
+    fmu = build(decks.load(path, **options), tmp_path / "deck.fmu")
     assert fmpy.validation.validate_fmu(str(fmu)) == []
     result = fmpy.simulate_fmu(str(fmu), stop_time=1e-3, output_interval=1e-4)
     assert all(np.isfinite(result[name]).all() for name in result.dtype.names)
+
+
+def test_a_built_deck_runs_in_fmpy(tmp_path):
+    run_in_fmpy(everything().write(tmp_path / "deck_0000.rad"), tmp_path)
+
+
+@pytest.mark.parametrize("path", sorted([*(HERE / "decks").glob("*.rad"), *(HERE.parent / "scenes").glob("*.rad")]))
+def test_decks_of_the_repository_run_in_fmpy(tmp_path, path):
+    decks.import_deck(path, tmp_path / "scene.toml")
+    assert report(scene.load(tmp_path / "scene.toml"))["slaves"] == report(scene.load(path))["slaves"]
+    run_in_fmpy(path, tmp_path)
+    run_in_fmpy(path, tmp_path, free=("1", "2"))

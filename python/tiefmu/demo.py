@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from ._core import SceneError
+from .decks import is_deck
 from .package import build
 from .plot import plot
 from .report import report
@@ -30,11 +31,12 @@ class Check:
 
 
 def demo(out: Path, scenes: Path = SCENES) -> bool:
-    """Runs every scene of the folder with the inputs NAME.csv beside it, if there; True if every check held.
+    """Runs every scene and every deck of the folder; True if every check held.
 
-    Writes NAME.fmu, NAME.csv and NAME.png to `out`. Raises SceneError, RunError.
+    Inputs are NAME.csv beside it, if there. Writes NAME.fmu, NAME.csv and NAME.png to `out`.
+    Raises SceneError, RunError.
     """
-    paths = sorted(scenes.glob("*.toml"))
+    paths = sorted([*scenes.glob("*.toml"), *(path for path in scenes.iterdir() if is_deck(path))])
     if not paths:
         raise SceneError(f"{scenes}: no scenes here; give the folder with --scenes")
     out.mkdir(parents=True, exist_ok=True)

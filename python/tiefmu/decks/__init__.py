@@ -69,7 +69,7 @@ def compiled(found: Imported):
 
     path = Path(found.deck.file)
     with tempfile.TemporaryDirectory(prefix="tiefmu-") as folder:
-        tables = write.files(found, Path(folder), path.stem)
+        tables = write.files(found, Path(folder), path.stem, to_keep=False)
         try:
             scene = Scene(found.deck.file, path.stem, schema.parse(tables), Path(folder))
         except SceneError as error:

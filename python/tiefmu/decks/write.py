@@ -6,6 +6,7 @@ import os
 import textwrap
 from pathlib import Path
 
+import numpy as np
 import tomli_w
 
 from .._core import SceneError
@@ -18,10 +19,11 @@ def remarks(deck: Deck) -> list[str]:
     return deck.notes + [f"{name} ({count}) left aside: {why}" for name, (why, count) in sorted(deck.ignored.items())]
 
 
-def files(found, folder: Path, name: str) -> dict:
-    """Writes mesh and node properties to `folder`; returns the tables of the scene, which name them."""
+def files(found, folder: Path, name: str, to_keep: bool = True) -> dict:
+    """Writes mesh and node properties to `folder`; returns the tables of the scene, which name them. to_keep: small
+    and to be read by people, else quickly."""
     written = found.scene
-    mesh, nodes = f"{name}.mesh.npz", f"{name}.nodes.csv"
+    mesh, nodes = f"{name}.mesh.npz", f"{name}.nodes.{'csv' if to_keep else 'npz'}"
     arrays.write(
         folder / mesh,
         written.node_id,
@@ -30,8 +32,13 @@ def files(found, folder: Path, name: str) -> dict:
         written.segments,
         written.node_sets,
         written.segment_sets,
+        to_keep,
     )
-    (folder / nodes).write_text(table(written.columns), encoding="utf-8")
+    if to_keep:
+        (folder / nodes).write_text(table(written.columns), encoding="utf-8")
+    else:
+        with (folder / nodes).open("wb") as file:
+            np.savez(file, **written.columns)
     tables = dict(written.tables)
     head = {key: tables.pop(key) for key in ("title", "units") if key in tables}
     return head | {"mesh": {"file": mesh, "properties": nodes}} | tables
@@ -39,11 +46,14 @@ def files(found, folder: Path, name: str) -> dict:
 
 def table(columns: dict) -> str:
     """Columns as CSV; numbers in the shortest form that reads back to the same double, 0 as empty field."""
-    rows = [column.tolist() for column in columns.values()]
+    rows = [
+        ["" if item == 0 else item for item in column.tolist()] if column.dtype.kind == "f" else column.tolist()
+        for column in columns.values()
+    ]
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(columns)
-    writer.writerows([["" if item == 0 else item for item in row] for row in zip(*rows)])
+    writer.writerows(zip(*rows))
     return text.getvalue()
 
 

@@ -16,11 +16,13 @@ from .data import Block, MeshFile, find
 SHAPES = {"node_id": (), "position": (3,), "segment_id": (), "segments": (4,)}
 
 
-def write(path: Path, node_id, position, segment_id, segments, node_sets: dict, segment_sets: dict):
+def write(path: Path, node_id, position, segment_id, segments, node_sets: dict, segment_sets: dict, small: bool = True):
+    """small: compressed, which takes a while."""
     sets = {f"nodes:{name}": ids for name, ids in node_sets.items()}
     sets |= {f"segments:{name}": ids for name, ids in segment_sets.items()}
     with path.open("wb") as file:
-        np.savez_compressed(file, node_id=node_id, position=position, segment_id=segment_id, segments=segments, **sets)
+        save = np.savez_compressed if small else np.savez
+        save(file, node_id=node_id, position=position, segment_id=segment_id, segments=segments, **sets)
 
 
 def read(path: Path) -> MeshFile:
