@@ -4,7 +4,6 @@ node_id (n), position (n, 3); segment_id (m), segments (m, 4: node ids, 0 as a t
 called "nodes:NAME" and "segments:NAME".
 """
 
-import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -26,11 +25,12 @@ def write(path: Path, node_id, position, segment_id, segments, node_sets: dict, 
 
 
 def read(path: Path) -> MeshFile:
-    try:
-        with np.load(path, allow_pickle=False) as file:
-            arrays = {key: file[key] for key in file.files}
-    except (ValueError, EOFError, KeyError, AttributeError, zipfile.BadZipFile, NotImplementedError) as error:
-        raise SceneError(f"cannot be read as npz ({' '.join(str(error).split())})") from None
+    with path.open("rb") as opened:
+        try:  # NumPy's messages for damaged files are of many types
+            with np.load(opened, allow_pickle=False) as file:
+                arrays = {key: file[key] for key in file.files}
+        except Exception as error:
+            raise SceneError(f"cannot be read as npz ({' '.join(str(error).split())})") from None
     for key, columns in SHAPES.items():
         array = arrays.get(key)
         if array is None:
