@@ -165,6 +165,26 @@ def test_transformations(tmp_path, kind, cards, x, expected):
     assert found[21] == pytest.approx(expected, abs=1e-15) and found[3] == [1, 1, 0]
 
 
+def test_submodels_move_before_node_groups(tmp_path):
+    deck = plate()
+    deck.lines += ["//SUBMODEL/7", "moved", f"{0:>10}"]
+    deck.nodes({21: (1, 0, 0)}).lines.append("//ENDSUB")
+    deck.node_group(2, [21]).block("/TRANSFORM/ROT/1", (2, 0.0, 0.0, 0.0), (None, 0.0, 0.0, 1.0, 90.0), title="turns")
+    deck.block("/TRANSFORM/TRA/2", (0, 1.0, 0.0, 0.0, 0, 0, 7), title="first moves")
+    assert positions(read(deck.text(), tmp_path).deck)[21] == pytest.approx([0, 2, 0], abs=1e-15)
+
+
+def test_submodels_in_submodels(tmp_path):
+    deck = plate()
+    deck.lines += ["//SUBMODEL/7", "outer", f"{100:>10}", "//SUBMODEL/8", "inner", f"{0:>10}{1000:>10}"]
+    deck.nodes({1: (1, 0, 0)}).lines.append("//ENDSUB")
+    deck.nodes({2: (2, 0, 0)}).lines.append("//ENDSUB")
+    deck.block("/TRANSFORM/TRA/1", (0, 0.0, 0.0, 5.0, 0, 0, 7), title="both")
+    deck.block("/TRANSFORM/TRA/2", (0, 0.0, 3.0, 0.0, 0, 0, 8), title="the inner one")
+    found = positions(read(deck.text(), tmp_path).deck)
+    assert found[1101] == [1, 3, 5] and found[102] == [2, 0, 5] and found[3] == [1, 1, 0]
+
+
 def test_encrypted_blocks_are_refused_by_name(tmp_path):
     deck = plate().block("/MAT/LAW2/5", "x" * 20 + "Q" * 60, title="secret")
     with pytest.raises(decks.SceneError, match="/MAT/LAW2/5: is encrypted and cannot be read"):

@@ -102,6 +102,13 @@ def test_ignore_3_is_taken_as_2(tmp_path):
     assert one.scene.tables == other.scene.tables
 
 
+def test_fields_that_a_scene_has_nothing_for_are_said(tmp_path):
+    made = default_tie().block("/INTER/TYPE2/1", (99, 1, 0, 1, 3, 0, 2, 5, 0.5), title="weld")
+    found = read(made, tmp_path).deck
+    assert "Level and Idel left aside" in found.notes[0]
+    assert any("tie 'weld': columns 71 to 80, '5', are not understood" in line for line in found.warnings)
+
+
 def test_a_distance_of_its_own(tmp_path):
     tie = tie_of(default_tie().tie(1, 99, 1, 2, 1, 0, 0.45), tmp_path)
     assert tie.search_distance == 0.45 and tie.pairwise is None

@@ -245,9 +245,10 @@ def masters_rotate(deck: Deck, tie: Tie, values: Nodal, slaves: np.ndarray) -> n
         return np.full(len(slaves), whole.all())
     centre = deck.position[four].mean(axis=1)
     nearest = np.empty(len(slaves), int)
-    for start in range(0, len(slaves), 256):
-        x = deck.position[slaves[start : start + 256]]
-        nearest[start : start + 256] = ((x[:, None] - centre) ** 2).sum(axis=2).argmin(axis=1)
+    step = max(1, 10**6 // len(centre))
+    for start in range(0, len(slaves), step):
+        x = deck.position[slaves[start : start + step]]
+        nearest[start : start + step] = ((x[:, None] - centre) ** 2).sum(axis=2).argmin(axis=1)
     return whole[nearest]
 
 

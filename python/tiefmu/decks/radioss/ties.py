@@ -47,7 +47,7 @@ def read(deck: Deck, sets: Sets, block: Block, default: Defaults, wanted) -> Tie
     name = title or f"tie {number}"
     if not wanted(name, number):
         return None
-    group, surface, ignore, spotflag, _, search, _, distance = cards.read(0, "iiiiiii.r")
+    group, surface, ignore, spotflag, level, search, idel, other, distance = cards.read(0, "iiiiiiisr")
     ignore, spotflag, search = ignore or default.ignore, spotflag or default.spotflag, search or default.search
     where = f"tie '{name}': Spotflag {spotflag}"
     if spotflag in REFUSED:
@@ -86,6 +86,10 @@ def read(deck: Deck, sets: Sets, block: Block, default: Defaults, wanted) -> Tie
         said.append("rotations are not handed on")
     said.append(f"Isearch {search or '2 (default)'}: {tie.search}")
     said.append(f"Ignore {ignore % 1000}: a slave that finds nothing is {'dropped' if ignore % 1000 else 'an error'}")
+    if level or idel:
+        said.append("Level and Idel left aside: ties of a scene have no order, and its elements do not fail")
+    if other.strip("0"):
+        deck.warn(f"{block.at(cards.first)}: tie '{name}': columns 71 to 80, '{other}', are not understood")
     if distance:
         tie.search_distance = distance
         said.append(f"dsearch {distance:g}")
