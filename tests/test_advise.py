@@ -10,7 +10,8 @@ import tomllib
 from conftest import toml
 from tiefmu import advise as advising
 from tiefmu.cli import main
-from tiefmu.study import motion, speed_accuracy
+from tiefmu.run import inputs_beside
+from tiefmu.study import motion, speed_accuracy_runs
 from tiefmu.study.motion import Signals
 from tiefmu.study.variants import Source
 
@@ -23,7 +24,7 @@ FINER = 16  # how much finer than its stability limit the fresh reference of a f
 def short_times(monkeypatch):
     monkeypatch.setattr(motion, "REPEATS", 1)
     monkeypatch.setattr(motion, "SHORTEST", 0.0)
-    monkeypatch.setattr(speed_accuracy, "HORIZON", 20)
+    monkeypatch.setattr(speed_accuracy_runs, "HORIZON", 20)
 
 
 def relative(x, exact):
@@ -78,7 +79,7 @@ def slave_velocities(scene, given, edges):
 
 def check_free(path, new, advice):
     source = Source(path)
-    edges = speed_accuracy.intervals(source, Signals.read(source.scene, speed_accuracy.inputs_beside(path)))
+    edges = speed_accuracy_runs.intervals(source, Signals.read(source.scene, inputs_beside(path)))
     given, scene = Given(path.with_suffix(".csv")), written(path, new)
     assert advice.choice.step <= advising.SAFETY * scene.start.integrator_limit * (1 + 1e-9)
     limit = scene.start.get("stable_time_step")[0]

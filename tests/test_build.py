@@ -341,7 +341,7 @@ def test_a_failed_build_leaves_the_old_file_and_nothing_else(weld, tmp_path, mon
         return real(self, info, data, **options)
 
     monkeypatch.setattr(zipfile.ZipFile, "writestr", fails_at_the_end)
-    with pytest.raises(tiefmu.SceneError if isinstance(exception, OSError) else type(exception)) as error:
+    with pytest.raises(tiefmu.UsageError if isinstance(exception, OSError) else type(exception)) as error:
         tiefmu.build(scene, target)
     if isinstance(exception, OSError):
         assert str(error.value) == f"{target}: No space left on device"
@@ -351,6 +351,6 @@ def test_a_failed_build_leaves_the_old_file_and_nothing_else(weld, tmp_path, mon
 
 def test_build_into_a_missing_folder(weld, tmp_path):
     target = tmp_path / "no" / "weld.fmu"
-    with pytest.raises(tiefmu.SceneError) as error:
+    with pytest.raises(tiefmu.UsageError) as error:
         tiefmu.build(tiefmu.load(weld), target)
     assert str(error.value) == f"{target}: folder {target.parent} does not exist"

@@ -31,6 +31,42 @@ def rows(path) -> tuple[list[str], np.ndarray]:
     return header, np.array(values, float)
 
 
+WARNING = (  # of the scene `weld`
+    "warning: weld.toml: tie 'weld': slave 101: offset d = 0.04 m from segment 1, whose nodes have no rotations: the "
+    'offset never turns and the moment d x F is lost; formulation = "optimized" carries both\n'
+)
+
+
+def test_run_warns_as_build_does(weld, scene_file, capsys):
+    name = scene_file(weld)
+    assert main(["build", name]) == 0
+    assert capsys.readouterr().err == WARNING
+    assert main(["run", name, "--stop-time", "0.01"]) == 0
+    assert capsys.readouterr().err == WARNING
+
+
+def test_build_counts_its_notes_and_says_where_they_are(weld, scene_file, capsys):
+    weld["mesh"]["segments"].append([9, 1, 2, 1])
+    weld["tie"][0]["segments"] = [1]
+    name = scene_file(weld)
+    assert main(["build", name]) == 0
+    notes = tiefmu.report(tiefmu.load(name))["notes"]
+    assert len(notes) == 1
+    assert capsys.readouterr().out.splitlines()[1] == "1 note on the scene: tiefmu info weld.toml"
+
+
+def test_errors_of_the_command_line_are_not_those_of_a_scene(free, tmp_path):
+    scene = tiefmu.load(free)
+    assert not issubclass(tiefmu.UsageError, tiefmu.SceneError)
+    with pytest.raises(tiefmu.UsageError):
+        tiefmu.build(scene, tmp_path / "no" / "weld.fmu")
+    simulation = scene.simulation()
+    simulation.initialise(0.0)
+    with pytest.raises(tiefmu.StepTooLong):
+        simulation.step(1e300)
+    assert {tiefmu.Diverged, tiefmu.StepTooLong} <= set(RuntimeError.__subclasses__())
+
+
 def test_build_names_the_fmu_after_the_scene(weld, scene_file, capsys, tmp_path):
     (tmp_path / "scenes").mkdir()
     name = scene_file(weld, "scenes/weld.toml")
@@ -106,7 +142,7 @@ def test_run_prints_a_summary_without_output_files(weld, scene_file, capsys):
     said = capsys.readouterr()
     assert said.out.startswith("weld.toml: 10 steps to t = 0.01 s, 15 outputs\n")
     assert "slave[1].v[1]" in said.out
-    assert said.err == ""
+    assert said.err == WARNING
 
 
 def test_run_takes_the_default_experiment_of_the_fmu(free, scene_file, capsys):
@@ -158,7 +194,7 @@ def test_wrong_inputs(weld, scene_file, capsys, tmp_path, case):
         (tmp_path / "in.csv").write_text(text)
     assert main(["run", name, "--input", "in.csv", "--output", "out.csv"]) == 2
     said = capsys.readouterr()
-    assert (said.out, said.err) == ("", f"error: {line}\n")
+    assert (said.out, said.err) == ("", f"{WARNING}error: {line}\n")
     assert not (tmp_path / "out.csv").exists()
 
 
@@ -266,7 +302,7 @@ def test_interrupt_of_a_running_simulation(weld, scene_file, monkeypatch, capsys
         assert main(["run", scene_file(weld), "--output", "out.csv"]) == 130
     finally:
         signal.signal(signal.SIGINT, before)
-    assert capsys.readouterr() == ("", "")
+    assert capsys.readouterr() == ("", WARNING)
     assert [path.name for path in tmp_path.iterdir()] == ["weld.toml"]
 
 

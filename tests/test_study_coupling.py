@@ -11,7 +11,7 @@ import tiefmu
 from conftest import toml
 from independent import Problem
 from scipy.integrate import solve_ivp
-from tiefmu.study import coupling
+from tiefmu.study import coupling, coupling_reference, coupling_runs
 from tiefmu.study.hosts import Coupling, InProcess, Packaged
 
 SCENES = Path(__file__).parents[1] / "scenes"
@@ -117,7 +117,7 @@ def test_study_repeats_and_writes_everything(spotweld, tmp_path):
 def test_exact_host(mass, stiffness):
     """One step of a sprung mass under a quadratic load, against DOP853."""
     one = np.ones(1)
-    host = coupling.Masses(2.0 * one, 300.0 * stiffness * one, 7.0 * mass * one)
+    host = coupling_runs.Masses(2.0 * one, 300.0 * stiffness * one, 7.0 * mass * one)
     step, u, v, loads = 0.3, 0.4, -1.3, (5.0, 3.0, -2.0)  # loads now, one and two steps ago
 
     class Still:
@@ -143,8 +143,8 @@ def test_exact_host(mass, stiffness):
 @pytest.mark.parametrize("scene", ["heavy_slave", "spotweld"])
 def test_reference_against_dop853(scene, reaction):
     """The monolithic system integrated by the tests' own code: slave velocities at some instants."""
-    one = coupling.Study(SCENES / f"{scene}.toml")
-    reference = coupling.Reference(one, reaction)
+    one = coupling_runs.Study(SCENES / f"{scene}.toml")
+    reference = coupling_reference.Reference(one, reaction)
     assert reference.error < 1e-11
     tables = reference.tables.model_dump(exclude_none=True)
     tables["mesh"].pop("file", None)
@@ -155,13 +155,13 @@ def test_reference_against_dop853(scene, reaction):
     times = np.linspace(0, one.window, 6)
     exact = np.array([now["slave_v"].ravel() for now in problem.solve(times, inputs, rtol=1e-12, atol=1e-17)])
     found = reference.at(times, "velocity")
-    assert coupling.relative(found, exact) < 1e-9
+    assert coupling_reference.relative(found, exact) < 1e-9
 
 
 def test_fmu_gives_the_bits_of_the_solver():
     """The same loop with the packaged FMU and with the solver in process."""
-    one = coupling.Study(SCENES / "spotweld.toml")
-    for reaction in coupling.REACTIONS:
+    one = coupling_runs.Study(SCENES / "spotweld.toml")
+    for reaction in coupling_runs.REACTIONS:
         scene = one.scene(reaction)
         with Packaged(scene) as packaged:
             inside = InProcess(scene)
@@ -177,13 +177,13 @@ def test_fmu_gives_the_bits_of_the_solver():
 
 def test_rigid_host_and_mass_ratio():
     """A host without springs ends where the monolithic system does; the ratio is what was asked for."""
-    one = coupling.Study(SCENES / "heavy_slave.toml", host="rigid", mass_ratio=0.5)
+    one = coupling_runs.Study(SCENES / "heavy_slave.toml", host="rigid", mass_ratio=0.5)
     assert one.ratio == pytest.approx(0.5)
     assert not one.masses("split", 0 * one.own).stiffness.any()
     with Packaged(one.scene("split")) as tie:
         velocity, _, _, _ = one.simulate(tie, one.masses("split", tie.added), one.window / 2000, 1, 2000)
-    reference = coupling.Reference(one, "split")
-    assert coupling.relative(velocity[-1], reference.values["velocity"][-1]) < 1e-5
+    reference = coupling_reference.Reference(one, "split")
+    assert coupling_reference.relative(velocity[-1], reference.values["velocity"][-1]) < 1e-5
 
 
 def test_scenes_it_cannot_do(tmp_path, monkeypatch):
@@ -201,7 +201,7 @@ def test_scenes_it_cannot_do(tmp_path, monkeypatch):
     ):
         Path(f"{name}.toml").write_text(toml(quad | {"node": [node]}))
         with pytest.raises(tiefmu.SceneError, match=words) as caught:
-            coupling.Study(f"{name}.toml")
+            coupling_runs.Study(f"{name}.toml")
         assert str(caught.value).startswith(f"{name}.toml: ") and "\n" not in str(caught.value)
     with pytest.raises(tiefmu.SceneError, match="no such file"):
-        coupling.Study("gone.toml")
+        coupling_runs.Study("gone.toml")

@@ -13,7 +13,7 @@ from independent import Problem
 from scipy.integrate import solve_ivp
 from tiefmu import SceneError
 from tiefmu.cli import main
-from tiefmu.study import motion, reference, speed_accuracy
+from tiefmu.study import motion, reference, speed_accuracy, speed_accuracy_runs
 from tiefmu.study.driven import DrivenRun, HeavyRun
 from tiefmu.study.motion import FreeRun, Signals
 from tiefmu.study.variants import METHODS, Source, Variant
@@ -48,7 +48,7 @@ def folder(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(motion, "REPEATS", 1)
         patch.setattr(motion, "SHORTEST", 0.0)
-        patch.setattr(speed_accuracy, "HORIZON", 4)
+        patch.setattr(speed_accuracy_runs, "HORIZON", 4)
         yield tmp_path_factory.mktemp("study")
 
 
@@ -165,7 +165,7 @@ def test_two_runs_differ_only_in_the_time_columns(free, folder):
 
 
 def test_the_csv_reads_back(free):
-    rows = speed_accuracy.read(free)
+    rows = speed_accuracy_runs.read(free)
     for row, text in zip(rows, records(free)):
         assert {name: str(value) for name, value in asdict(row).items()} == text
 
@@ -176,7 +176,7 @@ def test_the_csv_reads_back(free):
 def test_reference_of_a_free_scene_is_dop853_of_the_independent_equations(folder, free):
     source = Source(folder / "free.toml")
     signals = Signals.read(source.scene, None)
-    edges = speed_accuracy.intervals(source, signals)
+    edges = speed_accuracy_runs.intervals(source, signals)
     ours, error = reference.solve(FreeRun(source.build(Variant(), "rk4", heavy=True), signals, edges), 1e-11)
     assert error[0] <= 1e-11
     exact = Problem(FREE).solve(edges, rtol=1e-13)[1:]
@@ -246,7 +246,7 @@ def test_the_page_stands_alone(free, driven):
 
 def test_interruption_leaves_the_finished_rows(folder, free, monkeypatch):
     source, table, count = Source(folder / "free.toml"), folder / "stopped.csv", 0
-    original = speed_accuracy.Study.measured
+    original = speed_accuracy_runs.Study.measured
 
     def measured(*arguments, **values):
         nonlocal count
@@ -255,7 +255,7 @@ def test_interruption_leaves_the_finished_rows(folder, free, monkeypatch):
             raise KeyboardInterrupt
         return original(*arguments, **values)
 
-    monkeypatch.setattr(speed_accuracy.Study, "measured", measured)
+    monkeypatch.setattr(speed_accuracy_runs.Study, "measured", measured)
     with pytest.raises(KeyboardInterrupt):
         speed_accuracy.study(source, None, table, 3)
     assert len(records(table)) == 4  # the exact solution and three runs

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from tiefmu.study import limits, stability, stability_cases, stability_map
+from tiefmu.study import limits, stability, stability_cases, stability_geometry, stability_map
 
 LIMITS = stability_cases.limits()
 VALUES = [value for cases in stability_cases.VALUES for value in cases()]
@@ -70,9 +70,9 @@ def test_row_sum_rule_fails_where_lambda_does_not():
     """The control of item 6: as the segment turns, the row-sum rule spreads and falls below what it should bound."""
     corners = np.array([[-2.5, -0.5, 0], [2.5, -0.5, 0], [2.5, 0.5, 0], [-2.5, 0.5, 0]])
     rule, lam = [], []
-    for turn in stability_cases.frames(100):
+    for turn in stability_geometry.frames(100):
         found = limits._core.kernels.node_inertia(corners @ turn.T)
-        rule.append(stability_cases.row_sum(found["ibar"]))
+        rule.append(stability_geometry.row_sum(found["ibar"]))
         lam.append(found["lambda"])
     assert np.ptp(lam) < 1e-12 * np.mean(lam)
     assert np.ptp(rule) > np.mean(lam)
@@ -81,9 +81,9 @@ def test_row_sum_rule_fails_where_lambda_does_not():
 
 def test_drift_of_integrated_velocities_fails_the_check():
     """The control of item 7: what this program passes, velocity-integrated positions do not, tiny steps or not."""
-    assert stability_cases.program_drift(2 * np.pi / 2000, 1) < 1e-12
-    assert stability_cases.spin_drift(2 * np.pi / 2000, 0.0, 1) > 1e-3
-    assert stability_cases.spin_drift(2 * np.pi / 2000, 0.5, 1) > 1e-9
+    assert stability_geometry.program_drift(2 * np.pi / 2000, 1) < 1e-12
+    assert stability_geometry.spin_drift(2 * np.pi / 2000, 0.0, 1) > 1e-3
+    assert stability_geometry.spin_drift(2 * np.pi / 2000, 0.5, 1) > 1e-9
 
 
 def test_edge_of_what_has_no_limit_there():

@@ -381,6 +381,15 @@ class Run {
     return result;
   }
 
+  std::vector<std::string> variableNames(std::size_t number) const {
+    const Block& b = blocks.at(number);
+    const std::size_t components = static_cast<std::size_t>(b.components);
+    std::vector<std::string> names;
+    for (std::size_t k = 0; k < b.count(); ++k)
+      names.push_back(variableName(b, k / components, static_cast<int>(k % components)));
+    return names;
+  }
+
   Simulation simulation;
 
  private:
@@ -421,6 +430,8 @@ NB_MODULE(_core, m) {
       "A scene that cannot be read, modelled or started; one line 'FILE: table: id: message'.";
   nb::exception<Diverged>(m, "Diverged", PyExc_RuntimeError).attr("__doc__") =
       "A step ended in a non-finite or runaway number; the state before it has been put back.";
+  nb::exception<StepTooLong>(m, "StepTooLong", PyExc_RuntimeError).attr("__doc__") =
+      "A step that would take more substeps than any run could make; nothing has changed.";
 
   nb::class_<Scene>(m, "Scene", "Nodes, segments, ties and springs as arrays, by index. SI units.")
       .def(nb::init<>())
@@ -496,6 +507,8 @@ NB_MODULE(_core, m) {
           "restore", [](Run& r, const Simulation::State& state) { r.simulation.restore(state); }, "state"_a)
       .def_prop_ro("fields", &Run::fields, "Names of the model's fields and how many values each has.")
       .def_prop_ro("variables", &Run::variables, "The FMU's variables, as a list of blocks in value reference order.")
+      .def("variable_names", &Run::variableNames, "block"_a,
+           "FMU names of the block of this number in `variables`, in value reference order, e.g. slave[1].v[3].")
       .def_prop_ro("time", [](const Run& r) { return r.simulation.time(); })
       .def_prop_ro(
           "evaluations", [](const Run& r) { return r.simulation.evaluations(); }, "Force evaluations so far.")

@@ -1,11 +1,22 @@
 """What a scene needs and no more: the cheapest model, method and step whose error stays under a tolerance, measured."""
 
+import os
+from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
-from ._core import Diverged, SceneError
+from .arguments import check_folder_of, positive
+from .errors import Diverged, SceneError, UsageError
+from .run import inputs_beside
+from .scene_file import toml_text
+from .study import reference
+from .study.driven import METHODS as SAMPLINGS
+from .study.driven import SAMPLES, DrivenRun, HeavyRun
+from .study.motion import FreeRun, Signals
+from .study.speed_accuracy_runs import intervals
+from .study.variants import METHODS, Source, Variant, compiles
 
 SAFETY = 0.9  # of the stability limit: no step above it is advised
 HALVINGS = 12  # of the first step, before a method is given up
@@ -13,8 +24,6 @@ ALIKE = 1.1  # costs closer than this factor count as equal; then the simpler ch
 
 
 def add_parser(commands):
-    from .cli import positive
-
     parser = commands.add_parser(
         "advise",
         help="say what a scene needs and no more",
@@ -35,11 +44,8 @@ def add_parser(commands):
 
 
 def command(options):
-    from .study.speed_accuracy import inputs_beside
-    from .study.variants import Source
-
-    if options.write and not options.write.parent.is_dir():
-        raise SceneError(f"{options.write}: folder {options.write.parent} does not exist")
+    if options.write:
+        check_folder_of(options.write)
     source = Source(options.scene)
     advice = advise(source, options.input or inputs_beside(options.scene), options.tolerance)
     print("\n".join(advice.lines(source)))
@@ -53,7 +59,7 @@ class Choice:
     """One model, method and step with what was measured. step: s, of the integrator, or of the communication where
     nothing is integrated."""
 
-    variant: object
+    variant: Variant
     method: str
     reaction: str
     step: float
@@ -77,7 +83,7 @@ class Advice:
     tolerance: float
     choice: Choice
     others: list[Choice]  # what else stays under the tolerance, cheapest first
-    models: list  # (variant, model error) of every model, cheapest first
+    models: list[tuple[Variant, float]]  # (variant, model error) of every model, cheapest first
     mass_ratio: float  # r of the driven masters, nan: none
     limit: float  # stability limit of the chosen method, s
 
@@ -104,12 +110,14 @@ class Advice:
             lines.append(f"freedoms: all; without the rotations of the masters {without}")
         else:
             lines.append("freedoms: all (translations only; there are no rotations to leave out)")
-        for key, cheap, costly in (("inertia", "lumped", "consistent"), ("geometry", "small", "finite")):
-            chosen = getattr(c.variant, key)
-            if chosen == cheap:
+        for key, cheap, costly, cheaper in (
+            ("inertia", "lumped", "consistent", replace(c.variant, inertia="lumped")),
+            ("geometry", "small", "finite", replace(c.variant, geometry="small")),
+        ):
+            if cheaper == c.variant:
                 lines.append(f"{key}: {cheap}; error of this model {error_text(errors[c.variant])} at any step")
             else:
-                lines.append(f"{key}: {costly}; {cheap} would cost {instead(replace(c.variant, **{key: cheap}))}")
+                lines.append(f"{key}: {costly}; {cheap} would cost {instead(cheaper)}")
         if c.driven:
             lines.append(
                 f"integrator: none, every master is driven; communication step {c.step:.4g} s with the "
@@ -150,9 +158,7 @@ def error_text(error: float) -> str:
 
 
 def advise(source, inputs: Path | None, tolerance: float) -> Advice:
-    """Raises SceneError, also where nothing reaches the tolerance."""
-    from .study.motion import Signals
-
+    """Raises SceneError, and UsageError where nothing reaches the tolerance."""
     signals = Signals.read(source.scene, inputs)
     ratio = mass_ratio(source) if source.any_driven else np.nan
     search = (FreeSearch if source.any_free else DrivenSearch)(source, signals, tolerance, ratio)
@@ -167,7 +173,7 @@ def advise(source, inputs: Path | None, tolerance: float) -> Advice:
                 good.append(choice)
     if not good:
         least = min([choice.error for choice in tried] + [error for _, error in search.models if error > tolerance])
-        raise SceneError(
+        raise UsageError(
             f"{source.file}: tolerance {tolerance:g} is out of reach; the least error found is {least:.2g}"
         )
     good.sort(key=lambda choice: choice.cost)
@@ -180,8 +186,6 @@ def advise(source, inputs: Path | None, tolerance: float) -> Advice:
 
 def mass_ratio(source) -> float:
     """Largest eigenvalue of (host's mass)^-1 (mass that the tie adds), theory 5; inf where a host node has none."""
-    from .study.variants import Variant
-
     scene = source.build(Variant())
     nodes, simulation = scene.model.report()["nodes"], scene.simulation()
     simulation.initialise(0.0)
@@ -212,19 +216,16 @@ def mass_ratio(source) -> float:
     return float(np.abs(np.linalg.eigvals(tied[np.ix_(used, used)] / own[used, None])).max())
 
 
-class Search:
+class Search(ABC):
     """models: (variant, model error), the cheapest first."""
 
     def __init__(self, source, signals, tolerance: float, ratio: float):
-        from .study import reference
-        from .study.variants import Variant, compiles
-
         self.source, self.signals, self.tolerance, self.ratio = source, signals, tolerance, ratio
         self.prepare()
         small = max(1e-11, 1e-4 * tolerance)
         self.reference, error = reference.solve(self.exact_run(Variant()), small)
         if error[0] > 0.1 * tolerance:
-            raise SceneError(
+            raise UsageError(
                 f"{source.file}: tolerance {tolerance:g} is out of reach; the reference itself is "
                 f"only good to {error[0]:.2g}"
             )
@@ -240,6 +241,26 @@ class Search:
                 own = reference.solve(self.exact_run(variant), max(1e-10, 1e-2 * tolerance))[0]
                 v, f, _ = own.difference(self.reference)
                 self.models.append((variant, max(v, f) if not source.any_free else v))
+
+    intervals: int  # of a run
+
+    @abstractmethod
+    def prepare(self) -> None: ...
+
+    @abstractmethod
+    def exact_run(self, variant: Variant) -> FreeRun | HeavyRun:
+        """The run that is solved to rounding."""
+
+    @abstractmethod
+    def methods(self, variant: Variant) -> list[tuple[str, str]]:
+        """(method, reaction) of what is tried."""
+
+    @abstractmethod
+    def largest_step(self, variant: Variant, method: str, reaction: str) -> Choice: ...
+
+    @abstractmethod
+    def total(self, errors: tuple[float, float]) -> float:
+        """What the tolerance is for, of the errors of velocities and loads."""
 
     def limit(self, choice: Choice) -> float:
         return np.inf
@@ -279,22 +300,16 @@ class Search:
 
 class FreeSearch(Search):
     def prepare(self):
-        from .study.speed_accuracy import intervals
-
         self.edges = intervals(self.source, self.signals)
         self.intervals = len(self.edges) - 1
 
     def run(self, variant, method):
-        from .study.motion import FreeRun
-
         return FreeRun(self.source.build(variant, method, heavy=True), self.signals, self.edges)
 
     def exact_run(self, variant):
         return self.run(variant, "rk4")
 
     def methods(self, variant):
-        from .study.variants import METHODS
-
         reaction = "full" if np.isnan(self.ratio) else "loads" if variant.inertia == "lumped" else "split"
         return [(method, reaction) for method in METHODS]
 
@@ -312,8 +327,6 @@ class FreeSearch(Search):
 
 class DrivenSearch(Search):
     def prepare(self):
-        from .study.driven import SAMPLES
-
         if not self.signals.values:
             raise SceneError(
                 f"{self.source.file}: every master is driven and there is no input to drive it; give --input CSV"
@@ -321,32 +334,22 @@ class DrivenSearch(Search):
         self.intervals = SAMPLES
 
     def exact_run(self, variant):
-        from .study.driven import HeavyRun
-
         return HeavyRun(self.source.build(variant, "rk4", heavy=True), self.signals)
 
     def methods(self, variant):
-        from .study.driven import METHODS
-
         reactions = ["loads"] if variant.inertia == "lumped" else ["split"]
-        return [(method, reaction) for reaction in reactions for method in METHODS]
+        return [(method, reaction) for reaction in reactions for method in SAMPLINGS]
 
     def total(self, errors) -> float:
         return max(errors)
 
     def largest_step(self, variant, method, reaction) -> Choice:
-        from .study.driven import DrivenRun
-
         run = DrivenRun(self.source.build(variant, reaction=reaction), self.signals, reaction, method)
         return self.refined(run, 1, lambda **found: Choice(variant, method, reaction, **found))
 
 
 def written(source, advice: Advice, options) -> str:
     """The scene file with what was advised in place of what it had."""
-    import os
-
-    from .study import toml
-
     c = advice.choice
     tables = source.changed(c.variant)
     if source.any_driven:
@@ -362,4 +365,4 @@ def written(source, advice: Advice, options) -> str:
         path = (source.folder / raw["mesh"][key]).resolve()
         raw["mesh"][key] = Path(os.path.relpath(path, options.write.resolve().parent)).as_posix()
     head = f"# {Path(options.scene).name} as advised for an error of {options.tolerance:g}"
-    return "\n".join([head, *(f"# {line}" for line in advice.lines(source)[1:]), toml.text(raw)])
+    return "\n".join([head, *(f"# {line}" for line in advice.lines(source)[1:]), toml_text(raw)])

@@ -2,16 +2,23 @@
 
 import argparse
 import json
-import math
 import os
 import sys
 import tempfile
 from pathlib import Path
 
 from . import __version__, advise, study
-from ._core import SceneError
+from .arguments import check_folder_of, existing, is_fmu, positive
 from .decks import command as import_command
-from .run import RunError
+from .demo import SCENES, demo
+from .errors import RunError, SceneError, UsageError
+from .package import build
+from .plot import plot
+from .report import counted, of_fmu, report, summary, text
+from .run import run, write_outputs
+from .scene import load
+
+SHOWN = 20  # outputs that `run` prints
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -21,7 +28,7 @@ def main(arguments: list[str] | None = None) -> int:
         status = options.command(options) or 0
         sys.stdout.flush()
         return status
-    except (SceneError, RunError) as error:
+    except (SceneError, UsageError, RunError) as error:
         return fail(str(error))
     except BrokenPipeError:  # somebody reads no further, as in `tiefmu info weld.toml | head`
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -100,52 +107,24 @@ def parser() -> argparse.ArgumentParser:
     return top
 
 
-def positive(text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not 0 < value < math.inf:
-        raise argparse.ArgumentTypeError(f"'{text}' is not a positive number")
-    return value
+def show_warnings(file: str, found: dict) -> None:
+    """The warnings of a report, on stderr."""
+    for line in found["warnings"]:
+        print(f"warning: {file}: {line}", file=sys.stderr)
 
 
-def is_fmu(name: str) -> bool:
-    return name.lower().endswith(".fmu")
-
-
-def existing(name: str) -> Path:
-    path = Path(name)
-    if not path.is_file():
-        raise SceneError(f"{name}: no such file")
-    return path
-
-
-# Imports below are where they are needed: a command that fails early, or only asks for help, should be quick.
-
-
-def run_build(options):
-    from .package import build
-    from .report import report, summary
-    from .scene import load
-
+def run_build(options: argparse.Namespace) -> None:
     scene = load(options.scene)
     fmu = build(scene, options.output or Path(f"{scene.name}.fmu"))
     found = report(scene)
-    for line in found["warnings"]:
-        print(f"warning: {options.scene}: {line}", file=sys.stderr)
+    show_warnings(options.scene, found)
     print(f"{fmu}: {summary(found)}, {fmu.stat().st_size / 1024:.0f} KiB")
+    if found["notes"]:
+        print(f"{counted(len(found['notes']), 'note')} on the scene: tiefmu info {options.scene}")
 
 
-def run_info(options):
-    from .report import of_fmu, report, text
-
-    if is_fmu(options.model):
-        found = of_fmu(existing(options.model))
-    else:
-        from .scene import load
-
-        found = report(load(options.model))
+def run_info(options: argparse.Namespace) -> None:
+    found = of_fmu(existing(options.model)) if is_fmu(options.model) else report(load(options.model))
     if options.json:
         json.dump(found, sys.stdout, allow_nan=False)
         print()
@@ -153,46 +132,38 @@ def run_info(options):
         print(text(options.model, found), end="")
 
 
-def run_run(options):
-    from .run import run, write_outputs
-
-    for path in (options.output, options.plot):
-        if path and not path.parent.is_dir():
-            raise SceneError(f"{path}: folder {path.parent} does not exist")
+def run_run(options: argparse.Namespace) -> None:
+    files = [path for path in (options.output, options.plot) if path]
+    for path in files:
+        check_folder_of(path)
     with tempfile.TemporaryDirectory(prefix="tiefmu-") as folder:
         if is_fmu(options.model):
             fmu = existing(options.model)
         else:
-            from .package import build
-            from .scene import load
-
             scene = load(options.model)
             fmu = build(scene, Path(folder) / f"{scene.name}.fmu")
+            show_warnings(options.model, report(scene))
         result = run(fmu, options.stop_time, options.step, options.input, name=options.model)
     if options.output:
         write_outputs(result, options.output)
     if options.plot:
-        from .plot import plot
-
         plot(result, options.plot, Path(options.model).stem)
     outputs = result.dtype.names[1:]
     print(
         f"{options.model}: {len(result) - 1} steps to t = {result['time'][-1]:g} s, {len(outputs)} outputs"
-        + "".join(f", wrote {path}" for path in (options.output, options.plot) if path)
+        + "".join(f", wrote {path}" for path in files)
     )
-    if not options.output and not options.plot:
-        for name in outputs[:20]:
+    if not files:
+        for name in outputs[:SHOWN]:
             print(
                 f"  {name:<24} from {result[name].min():<12.6g} to {result[name].max():<12.6g} "
                 f"at the end {result[name][-1]:.6g}"
             )
-        if len(outputs) > 20:
-            print(f"  ... and {len(outputs) - 20} more (--output writes all)")
+        if len(outputs) > SHOWN:
+            print(f"  ... and {len(outputs) - SHOWN} more (--output writes all)")
 
 
-def run_demo(options):
-    from .demo import SCENES, demo
-
+def run_demo(options: argparse.Namespace) -> int:
     return 0 if demo(options.out, options.scenes or SCENES) else 1
 
 

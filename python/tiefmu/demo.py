@@ -3,16 +3,20 @@
 import time
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ._core import SceneError
 from .decks import is_deck
+from .errors import UsageError
 from .package import build
 from .plot import plot
 from .report import report
 from .run import run, write_outputs
 from .scene import load
+
+if TYPE_CHECKING:
+    from fmpy.simulation import SimulationResult
 
 SCENES = Path(__file__).resolve().parents[2] / "scenes"  # of the checkout
 
@@ -34,11 +38,11 @@ def demo(out: Path, scenes: Path = SCENES) -> bool:
     """Runs every scene and every deck of the folder; True if every check held.
 
     Inputs are NAME.csv beside it, if there. Writes NAME.fmu, NAME.csv and NAME.png to `out`.
-    Raises SceneError, RunError.
+    Raises SceneError, UsageError, RunError.
     """
     paths = sorted([*scenes.glob("*.toml"), *(path for path in scenes.iterdir() if is_deck(path))])
     if not paths:
-        raise SceneError(f"{scenes}: no scenes here; give the folder with --scenes")
+        raise UsageError(f"{scenes}: no scenes here; give the folder with --scenes")
     out.mkdir(parents=True, exist_ok=True)
     print(
         f"{'scene':<22} {'slaves':>7} {'masters':>7} {'variables':>9} {'steps':>6} {'t end [s]':>10} {'build':>7} "
@@ -71,12 +75,12 @@ def demo(out: Path, scenes: Path = SCENES) -> bool:
     return held
 
 
-def check(result: np.ndarray) -> list[Check]:
+def check(result: "SimulationResult") -> list[Check]:
     """Finite numbers everywhere, and what the scene exposes of its own balances."""
     names = result.dtype.names
-    checks = [Check("not finite", sum(int((~np.isfinite(result[name])).sum()) for name in names), 0)]
+    checks = [Check("not finite", int(sum((~np.isfinite(result[name])).sum() for name in names)), 0)]
 
-    def largest(name):
+    def largest(name: str) -> float:
         return float(np.abs(result[name]).max())
 
     if "drift" in names:

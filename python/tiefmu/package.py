@@ -11,8 +11,9 @@ from importlib.metadata import version
 from pathlib import Path
 
 from . import _core
-from ._core import SceneError
-from .extras import extras
+from .arguments import check_folder_of
+from .content import content
+from .errors import UsageError
 from .report import report
 from .scene import Scene
 
@@ -20,12 +21,14 @@ PLATFORM, SUFFIX = {"win32": ("win64", ".dll"), "darwin": ("darwin64", ".dylib")
 
 
 def build(scene: Scene, path) -> Path:
-    """Writes the FMU to `path` and returns it. Nothing is left behind when it fails; SceneError says why."""
+    """Writes the FMU to `path` and returns it. Nothing is left behind when it fails.
+
+    Raises UsageError where the file cannot be written.
+    """
     path = Path(path)
-    if not path.parent.is_dir():
-        raise SceneError(f"{path}: folder {path.parent} does not exist")
+    check_folder_of(path)
     if path.is_dir():
-        raise SceneError(f"{path}: is a folder")
+        raise UsageError(f"{path}: is a folder")
     part = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
         with zipfile.ZipFile(part, "w", zipfile.ZIP_DEFLATED) as archive:
@@ -33,7 +36,7 @@ def build(scene: Scene, path) -> Path:
                 archive.writestr(entry(name), data, compresslevel=3)  # a third of the time of 6, 15 % more bytes
         part.replace(path)
     except OSError as error:
-        raise SceneError(f"{path}: {error.strerror}") from None
+        raise UsageError(f"{path}: {error.strerror}") from None
     finally:
         part.unlink(missing_ok=True)
     return path
@@ -56,7 +59,7 @@ def contents(scene: Scene) -> dict[str, bytes]:
 
 def from_report(scene: Scene, step: float) -> dict[str, bytes]:
     found = report(scene)
-    return {"resources/report.json": json.dumps(found, allow_nan=False).encode()} | extras(scene, found, step)
+    return {"resources/report.json": json.dumps(found, allow_nan=False).encode()} | content(scene, found, step)
 
 
 def model_guid(scene: Scene, description: _core.Description) -> str:
@@ -72,7 +75,7 @@ def binary() -> bytes:
     folder = Path(_core.__file__).parent / "binaries"
     files = sorted(folder.glob("tiefmu.*"))
     if not files:
-        raise SceneError(f"{folder}: the FMU's binary is not installed; install tiefmu again")
+        raise UsageError(f"{folder}: the FMU's binary is not installed; install tiefmu again")
     return files[0].read_bytes()
 
 

@@ -2,21 +2,22 @@
 
 import re
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
+
+from . import figures
+
+if TYPE_CHECKING:
+    from fmpy.simulation import SimulationResult
 
 LINES = 8  # most in a panel: those that move most
 PANELS = 8  # most in a picture, in this order
 ORDER = ["port", "slave", "master", "point", "energy", "power_residual", "drift"]
 
 
-def plot(result: np.ndarray, path: Path, title: str):
+def plot(result: "SimulationResult", path: Path, title: str) -> None:
     """Writes a PNG of what `run` returned. Raises OSError."""
-    import matplotlib  # here, because importing it takes half a second
-
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
-
     units = {
         variable.name: variable.unit or (variable.declaredType and variable.declaredType.unit)
         for variable in result.modelDescription.modelVariables
@@ -27,7 +28,7 @@ def plot(result: np.ndarray, path: Path, title: str):
             quantity = "energy" if name.startswith("energy.") else re.sub(r"\[[^]]*\]", "", name)
             panels.setdefault(quantity, []).append(name)
     shown = sorted(panels.items(), key=lambda panel: ORDER.index(panel[0].split(".")[0]))[:PANELS]
-    figure, axes = plt.subplots(
+    figure, axes = figures.pyplot().subplots(
         max(len(shown), 1),
         1,
         sharex=True,
@@ -50,5 +51,4 @@ def plot(result: np.ndarray, path: Path, title: str):
         )
     axes[-1, 0].set_xlabel("time [s]")
     figure.suptitle(title)
-    figure.savefig(path, dpi=110, metadata={"Software": None})
-    plt.close(figure)
+    figures.save(figure, path, dpi=110)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ._core import SceneError
+from .errors import UsageError
 from .scene import MOTIONS, Scene
 
 MANY_VARIABLES = 10_000  # importers read them in seconds, masters connect them in minutes
@@ -211,18 +211,18 @@ def size_warning(variables: int) -> list[str]:
 
 
 def of_fmu(path: Path) -> dict:
-    """The report that an FMU carries; SceneError if it is none of ours."""
+    """The report that an FMU carries; UsageError if it is none of ours."""
     try:
         with zipfile.ZipFile(path) as archive:
             found = json.loads(archive.read("resources/report.json"))
     except KeyError:
-        raise SceneError(f"{path}: holds no resources/report.json, so it was not made by tiefmu") from None
+        raise UsageError(f"{path}: holds no resources/report.json, so it was not made by tiefmu") from None
     except OSError as error:
-        raise SceneError(f"{path}: {error.strerror}") from None
+        raise UsageError(f"{path}: {error.strerror}") from None
     except Exception:  # damaged archives raise many kinds
-        raise SceneError(f"{path}: not an FMU (a zip archive)") from None
+        raise UsageError(f"{path}: not an FMU (a zip archive)") from None
     if not isinstance(found, dict) or "slaves" not in found:
-        raise SceneError(f"{path}: its resources/report.json is none of tiefmu")
+        raise UsageError(f"{path}: its resources/report.json is none of tiefmu")
     return found
 
 

@@ -6,16 +6,17 @@ import io
 import math
 import tempfile
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+if TYPE_CHECKING:
+    from fmpy.simulation import SimulationResult
+
+from .errors import RunError
 from .schema import suggestion
 
 STEPS = 500  # at least, where the caller leaves the step open
-
-
-class RunError(Exception):
-    """A run that cannot start or did not finish; one line 'FILE: message'."""
 
 
 def run(
@@ -24,7 +25,7 @@ def run(
     step: float | None = None,
     inputs: Path | None = None,
     name: str | None = None,
-) -> np.ndarray:
+) -> "SimulationResult":
     """Runs the FMU and returns its outputs: a structured array with `time` (s) and one column an output, and FMPy's
     description of the FMU as `.modelDescription`.
 
@@ -110,7 +111,7 @@ def one_line(error) -> str:
     return " ".join(str(error).split())
 
 
-def read_inputs(path: Path, description) -> np.ndarray:
+def read_inputs(path: Path, description: Any) -> Any:
     """The input CSV as FMPy takes it: a structured array with `time` first. Raises RunError."""
     causality = {variable.name: variable.causality for variable in description.modelVariables}
     inputs = [name for name, kind in causality.items() if kind == "input"]
@@ -163,9 +164,15 @@ def read_inputs(path: Path, description) -> np.ndarray:
     return signals
 
 
-def write_outputs(result: np.ndarray, path: Path):
+def write_outputs(result: "SimulationResult", path: Path) -> None:
     """Writes `time` and the outputs as CSV; every number reads back to the same double. Raises OSError."""
     with open(path, "w", newline="", encoding="utf-8") as file:
         file.write(",".join(result.dtype.names) + "\n")
         for row in result.tolist():
             file.write(",".join(map(repr, row)) + "\n")
+
+
+def inputs_beside(scene: str | Path) -> Path | None:
+    """NAME.csv beside NAME.toml, if there."""
+    path = Path(scene).with_suffix(".csv")
+    return path if path.is_file() else None

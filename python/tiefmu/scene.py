@@ -30,8 +30,8 @@ class Scene:
 
     file: how messages call the source; name: of the model, from the file's name; title; notes, warnings: remarks of
     the reading (lists of str); ties: the [[tie]] tables in order; settings: the [model] table; rotations: ids of the
-    nodes declared with rotations; model: the compiled `_core.Model`; start: a `_core.Simulation` of it, initialised at
-    time 0.
+    nodes declared with rotations; gravity: m/s2 (3,); model: the compiled `_core.Model`; start: a `_core.Simulation`
+    of it, initialised at time 0.
     """
 
     def __init__(self, file: str, name: str, tables: schema.SceneTables, folder: Path):
@@ -40,6 +40,7 @@ class Scene:
         assembly = Assembly(tables, folder)
         self.notes, self.warnings = assembly.mesh.notes, assembly.mesh.warnings
         self.rotations = assembly.mesh.node_id[assembly.rotations]
+        self.gravity = assembly.units.si("gravity", tables.model.gravity)
         self.model = _core.Model(assembly.scene())
         self.start = self.simulation()
         self.start.initialise(0.0)
@@ -105,7 +106,7 @@ class Assembly:
 
     def __init__(self, tables: schema.SceneTables, folder: Path):
         self.tables = tables
-        self.units = Units(**tables.units.model_dump())
+        self.units = Units.of(tables.units)
         self.mesh = mesh.build(tables.mesh, folder)
         if not tables.tie and not tables.spring:
             raise SceneError("the scene has neither a tie nor a spring; give at least one [[tie]]")
@@ -124,8 +125,8 @@ class Assembly:
         self.ties = self.resolve_ties()
         self.springs = self.resolve_springs()
         self.ports = self.resolve_ports()
-        for number, table in enumerate(tables.initial, 1):
-            self.apply_initial(f"initial {number}", table)
+        for number, initial in enumerate(tables.initial, 1):
+            self.apply_initial(f"initial {number}", initial)
 
     # which nodes and segments a table means: sorted or as listed, as indices
 
@@ -281,14 +282,14 @@ class Assembly:
                 si("search_distance", table.search_distance),
                 table.unresolved == "drop",
             )
-        for number, (table, (a, b)) in enumerate(zip(self.tables.spring, self.springs), 1):
+        for number, (spring, (a, b)) in enumerate(zip(self.tables.spring, self.springs), 1):
             scene.add_springs(
                 f"spring {number}",
                 a.astype(np.int32),
                 b.astype(np.int32),
-                table.kind,
+                spring.kind,
                 *(
-                    np.broadcast_to(si(key, getattr(table, key)), 3).copy()
+                    np.broadcast_to(si(key, getattr(spring, key)), 3).copy()
                     for key in ("stiffness", "damping", "rotational_stiffness", "rotational_damping")
                 ),
             )

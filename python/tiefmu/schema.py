@@ -21,7 +21,6 @@ from pydantic import (
 from pydantic_core import PydanticCustomError
 
 from ._core import SceneError
-from .units import LENGTHS, MASSES, TIMES
 
 
 def suggestion(word: str, known) -> str:
@@ -161,7 +160,7 @@ def triangle(row: Any) -> Any:
     return row[:4] if isinstance(row, list) and len(row) == 5 and type(row[4]) is int and row[4] == 0 else row
 
 
-def two_nodes(value: Any) -> list[int]:
+def two_nodes(value: Any) -> str | list[int]:
     if not isinstance(value, list) or len(value) != 2:
         raise wrong(f"expected two node ids, found {found(value)}")
     return selection(value)
@@ -186,9 +185,9 @@ class Table(BaseModel):
 
 
 class Units(Table):
-    length: Literal[tuple(LENGTHS)] = "m"
-    mass: Literal[tuple(MASSES)] = "kg"
-    time: Literal[tuple(TIMES)] = "s"
+    length: Literal["m", "cm", "mm", "um", "km", "in", "ft"] = "m"  # the keys of LENGTHS, MASSES, TIMES in units.py
+    mass: Literal["kg", "g", "mg", "t", "lb"] = "kg"
+    time: Literal["s", "ms", "us", "min"] = "s"
 
 
 class Mesh(Table):
@@ -292,7 +291,7 @@ class SceneTables(Table):
     interface: Interface = Interface()
 
 
-TABLES = {
+TABLES: dict[str, type[Table]] = {
     "units": Units,
     "mesh": Mesh,
     "node": Node,
@@ -311,7 +310,7 @@ def parse(raw: dict) -> SceneTables:
     try:
         return SceneTables.model_validate(raw)
     except ValidationError as error:
-        raise SceneError(describe(error.errors(include_url=False)[0], raw)) from None
+        raise SceneError(describe(dict(error.errors(include_url=False)[0]), raw)) from None
 
 
 def table_name(key: str, number: int, table: Any) -> str:
@@ -324,7 +323,8 @@ def table_name(key: str, number: int, table: Any) -> str:
 def describe(error: dict, raw: dict) -> str:
     """One line for an error of pydantic: table, key or id, what was found, what would be right."""
     location, kind = list(error["loc"]), error["type"]
-    where, model = [], SceneTables
+    where: list[str] = []
+    model: type[Table] = SceneTables
     if len(location) > 1 and location[0] in ARRAYS:
         head, index = location[:2]
         where.append(table_name(head, index + 1, raw[head][index]))

@@ -1,6 +1,7 @@
 """Units of a scene file. Everything behind this module is in m, kg, s, N, rad."""
 
 from fractions import Fraction
+from typing import Any
 
 import numpy as np
 
@@ -44,6 +45,11 @@ class Units:
 
     def __init__(self, length: str = "m", mass: str = "kg", time: str = "s"):
         self._base = LENGTHS[length], MASSES[mass], TIMES[time]
+
+    @classmethod
+    def of(cls, table: Any) -> "Units":
+        """Those of a scene's [units]."""
+        return cls(table.length, table.mass, table.time)
 
     def si(self, key: str, value):
         """`value` (number or array) of the quantity `key` in SI, as a NumPy value of the same shape."""

@@ -7,10 +7,10 @@ import textwrap
 from pathlib import Path
 
 import numpy as np
-import tomli_w
 
 from .._core import SceneError
 from ..mesh import arrays
+from ..scene_file import toml_text
 from .model import Deck
 
 
@@ -61,7 +61,7 @@ def scene(found, path: Path):
     """Writes the scene file, its mesh and its node properties."""
     try:
         tables = files(found, path.parent, path.stem)
-        text = head(found.deck) + tomli_w.dumps(tables)
+        text = head(found.deck) + toml_text(tables)
         part = path.with_name(f".{path.name}.{os.getpid()}.part")
         part.write_text(text, encoding="utf-8")
         part.replace(path)

@@ -23,37 +23,34 @@ class Names:
     """FMU names of what the host sets and reads; masters in the order of their numbers."""
 
     def __init__(self, scene: Scene):
-        found = {}
-        for block in scene.start.variables:
-            found.setdefault((block["name"], block["causality"]), []).extend(block["numbers"].tolist())
-        self.driven = sorted(found.get(("master.v", "input"), []))
-        self.turning = sorted(found.get(("master.w", "input"), []))
+        found: dict[tuple[str, str], dict[int, list[str]]] = {}  # names of the components by number
+        for k, block in enumerate(scene.start.variables):
+            names, size = scene.start.variable_names(k), block["components"]
+            own = found.setdefault((block["name"], block["causality"]), {})
+            own |= {number: names[size * n : size * (n + 1)] for n, number in enumerate(block["numbers"].tolist())}
+
+        def names_of(name: str, causality: str, numbers: list[int]) -> list[str]:
+            own = found.get((name, causality), {})
+            return [component for number in numbers for component in own.get(number, [])]
+
+        self.driven = sorted(found.get(("master.v", "input"), {}))
+        self.turning = sorted(found.get(("master.w", "input"), {}))
         if not self.driven:
             raise SceneError(f"{scene.file}: no tied master is driven, so there is nothing for a host to move")
-        answering = found.get(("master.t", "output"), [])
-
-        def vectors(quantity, translations, rotations=()):
-            return [
-                f"master[{i}].{q}[{k}]"
-                for q, numbers in ((quantity[0], translations), (quantity[1], rotations))
-                for i in numbers
-                for k in (1, 2, 3)
-            ]
-
-        accelerated = ("master.a", "input") in found
-        self.velocity = vectors("vw", self.driven, self.turning)
-        self.acceleration = vectors("az", self.driven, self.turning) if accelerated else []
-        self.position = vectors("r-", self.driven) if ("master.r", "input") in found else []
+        self.velocity = names_of("master.v", "input", self.driven) + names_of("master.w", "input", self.turning)
+        self.acceleration = names_of("master.a", "input", self.driven) + names_of("master.z", "input", self.turning)
+        self.position = names_of("master.r", "input", self.driven)
         self.inputs = self.velocity + self.acceleration + self.position
-        self.load = vectors("ft", self.driven, [i for i in self.turning if i in answering])
+        self.load = names_of("master.f", "output", self.driven) + names_of("master.t", "output", self.turning)
         # freedom of each entry of `load`: a turning node without a moment output gets none
+        answering = found.get(("master.t", "output"), {})
         self.loaded = np.array(
             list(range(3 * len(self.driven)))
             + [3 * len(self.driven) + 3 * n + k for n, i in enumerate(self.turning) if i in answering for k in range(3)]
         )
-        self.slaves = sorted(found[("slave.v", "output")])
-        self.slave_velocity = [f"slave[{j}].v[{k}]" for j in self.slaves for k in (1, 2, 3)]
-        self.slave_force = [f"slave[{j}].f[{k}]" for j in self.slaves for k in (1, 2, 3)]
+        self.slaves = sorted(found["slave.v", "output"])
+        self.slave_velocity = names_of("slave.v", "output", self.slaves)
+        self.slave_force = names_of("slave.f", "input", self.slaves)
         self.freedoms = len(self.velocity)
 
 
@@ -81,6 +78,19 @@ class Tie:
         turning = (found["slaves"]["coupling"] != found["couplings"].index("translation")).any()
         free = (found["nodes"]["motion"] == MOTIONS.index("free")).any()
         self.keeps_state = bool(found["springs"] and (turning or free))
+
+    def restart(self) -> None:
+        """Back to time 0."""
+        raise NotImplementedError
+
+    def set_inputs(self) -> None:
+        raise NotImplementedError
+
+    def loads_now(self) -> np.ndarray:
+        raise NotImplementedError
+
+    def step(self, time: float, size: float) -> None:
+        raise NotImplementedError
 
     def carry(self, velocity, time: float, size: float):
         """One step of the tie. velocity: mean of the step, with which the tie turns its offsets; the velocity at either

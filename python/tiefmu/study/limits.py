@@ -30,8 +30,8 @@ class Limit:
 
     def tests(self) -> dict[str, Callable[[float], bool]]:
         """The ways to tell failing, by name."""
-        found = {"run": self.fails} if self.fails else {}
-        return found | ({"radius": lambda value: self.radius(value) > GROWS} if self.radius else {})
+        found, radius = {"run": self.fails} if self.fails else {}, self.radius
+        return found | ({"radius": lambda value: radius(value) > GROWS} if radius else {})
 
 
 @dataclass

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .._core import SceneError
+from ..run import read_inputs
 from ..scene import Scene
 
 REPEATS = 3
@@ -58,23 +58,18 @@ class Signals:
 
     @classmethod
     def read(cls, scene: Scene, path) -> "Signals":
-        """The CSV of `tiefmu run`; None: nothing but the start values. Raises SceneError."""
+        """The CSV of `tiefmu run`; None: nothing but the start values. Raises RunError."""
         if path is None:
             return cls(np.zeros(1), {})
-        from ..run import RunError, read_inputs
-
         inputs, known = {}, []
-        for block in scene.simulation().variables:
+        for number, block in enumerate(scene.start.variables):
             short = block["name"].removeprefix(block["prefix"] + ".")
-            for number, node in zip(block["numbers"].tolist(), block["ids"].tolist()):
-                for k in range(block["components"]):
-                    name = f"{block['prefix']}[{number}].{short}" + (f"[{k + 1}]" if block["components"] == 3 else "")
-                    known.append(_Variable(name, block["causality"]))
-                    inputs[name] = (node, short.removesuffix("_ext"), k)
-        try:
-            table = read_inputs(path, _Description(known))
-        except RunError as error:
-            raise SceneError(str(error)) from None
+            components = block["components"]
+            for k, name in enumerate(scene.start.variable_names(number)):
+                known.append(_Variable(name, block["causality"]))
+                node = int(block["ids"][k // components]) if len(block["ids"]) else 0
+                inputs[name] = (node, short.removesuffix("_ext"), k % components)
+        table = read_inputs(path, _Description(known))
         values = {}
         for name in table.dtype.names[1:]:
             node, quantity, k = inputs[name]
@@ -181,7 +176,7 @@ class Held:
                     value = signals.mean(key, a, b)
                 if row < place[field][0]:
                     now.setdefault(field, np.zeros(place[field]))[row] += value
-            changed = {field: x for field, x in now.items() if not np.array_equal(x, last.get(field))}
+            changed = {field: x for field, x in now.items() if field not in last or not np.array_equal(x, last[field])}
             last = now
             self.changes.append(changed)
 

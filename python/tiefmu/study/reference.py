@@ -9,6 +9,7 @@ differences - and the estimate says so.
 import numpy as np
 
 from .._core import Diverged, SceneError
+from .driven import HeavyRun
 from .motion import FreeRun, Trajectory
 
 ORDERS = 4  # terms removed at most: h^4 .. h^7
@@ -16,18 +17,19 @@ LEVELS = 12  # halvings at most
 MOST_STEPS = 5e5  # of one run
 
 
-def solve(run: FreeRun, tolerance: float) -> tuple[Trajectory, tuple[float, float]]:
+def solve(run: FreeRun | HeavyRun, tolerance: float) -> tuple[Trajectory, tuple[float, float]]:
     """The trajectory of a scene compiled with method "rk4", and the estimated relative errors of its velocities and
     loads. Stops where the velocities are within `tolerance`, or where halving no longer helps. Raises SceneError."""
     substeps = max(2, int(np.ceil(run.interval / (0.5 * run.limit)))) if run.limit < 1e29 else 2
-    intervals, last, best, best_error = len(run.edges) - 1, [], None, (np.inf, np.inf)
+    intervals, last = len(run.edges) - 1, []
+    best, best_error = Trajectory(np.zeros(0), np.zeros(0)), (np.inf, np.inf)
     for level in range(LEVELS):
         if level > 3 and substeps * intervals > MOST_STEPS:
             break
         try:
             row = [run.trajectory(substeps)]
-        except Diverged as error:
-            raise SceneError(f"{run.scene.file}: the reference solution diverged: {error}") from None
+        except Diverged as why:
+            raise SceneError(f"{run.scene.file}: the reference solution diverged: {why}") from None
         for order, coarser in enumerate(last[:ORDERS], 4):
             factor = 1 / (2.0**order - 1)
             row.append(

@@ -5,7 +5,8 @@ import math
 from dataclasses import asdict
 from pathlib import Path
 
-from .._core import SceneError
+from .. import figures
+from ..errors import UsageError
 from . import page, stability_cases, stability_map
 from .limits import GROWS, Limit, Value, edge
 
@@ -34,7 +35,7 @@ def run(options) -> int:
     from tqdm import tqdm
 
     if not 4 <= options.grid <= 200:
-        raise SceneError(f"--grid: expected 4 to 200 points, found {options.grid}")
+        raise UsageError(f"--grid: expected 4 to 200 points, found {options.grid}")
     options.out.mkdir(parents=True, exist_ok=True)
     limits, values, points = stability_cases.limits(), [], []
     limit_table, value_table = [], []
@@ -124,14 +125,8 @@ def agreeing(points: list) -> int:
 
 def draw(limit_table: list, folder: Path) -> Path:
     """Measured over closed-form limits, writes stability_limits.png and .svg; returns the latter."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    matplotlib.rcParams["svg.hashsalt"] = "limits"  # the same ids in every run
-    import matplotlib.pyplot as plt
-
     rows = limit_table[::-1]
-    figure, axis = plt.subplots(figsize=(10, 1.6 + 0.24 * len(rows)), layout="constrained")
+    figure, axis = figures.pyplot().subplots(figsize=(10, 1.6 + 0.24 * len(rows)), layout="constrained")
     axis.axvspan(1 - BRACKET, 1 + BRACKET, color="#e8eef2", label="2 % bracket")
     for column, marker, colour in ((4, "o", "#1f5fa8"), (5, "x", "#b3402e"), (6, "|", "#222222")):
         name = {4: "found by runs", 5: "spectral radius of one step", 6: "stated by the program"}[column]
@@ -148,13 +143,7 @@ def draw(limit_table: list, folder: Path) -> Path:
     axis.set(xlim=(0.97, 1.03), ylim=(-0.7, len(rows) - 0.3), xlabel="measured limit / closed form  [1]")
     axis.grid(axis="x", alpha=0.3)
     figure.legend(loc="outside upper right", ncol=4, frameon=False)
-    for suffix in ("png", "svg"):
-        figure.savefig(
-            folder / f"stability_limits.{suffix}",
-            dpi=130,
-            metadata={"Software": None} if suffix == "png" else {"Date": None},
-        )
-    plt.close(figure)
+    figures.save(figure, folder / "stability_limits.png", folder / "stability_limits.svg")
     return folder / "stability_limits.svg"
 
 

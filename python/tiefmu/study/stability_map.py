@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
+from .. import figures
 from .limits import GROWS, coupled, plate
 
 ZETA = 0.02  # of the host's masters on their springs
@@ -77,11 +78,6 @@ def split_limit(ratio: np.ndarray) -> np.ndarray:
 
 def draw(found: list[Point], folder: Path) -> Path:
     """Writes stability_map.png and .svg; returns the latter."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    matplotlib.rcParams["svg.hashsalt"] = "map"  # the same ids in every run
-    import matplotlib.pyplot as plt
     from matplotlib.colors import ListedColormap
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
@@ -94,7 +90,7 @@ def draw(found: list[Point], folder: Path) -> Path:
         ("split", 0): "split, force held",
         ("split", 1): "split, force extrapolated linearly",
     }
-    figure, panels = plt.subplots(2, 2, figsize=(10, 8.2), sharex=True, sharey=True, layout="constrained")
+    figure, panels = figures.pyplot().subplots(2, 2, figsize=(10, 8.2), sharex=True, sharey=True, layout="constrained")
     for axis, (reaction, order) in zip(panels.flat, MODES):
         own = [p for p in found if (p.reaction, p.order) == (reaction, order)]
         ratios, steps = sorted({p.ratio for p in own}), sorted({p.step for p in own})
@@ -150,11 +146,5 @@ def draw(found: list[Point], folder: Path) -> Path:
         f"Host of four masters on springs (omega, zeta = {ZETA:g}), slave tied in their middle:\n"
         "error of the worst mode's complex frequency"
     )
-    for suffix in ("png", "svg"):
-        figure.savefig(
-            folder / f"stability_map.{suffix}",
-            dpi=130,
-            metadata={"Software": None} if suffix == "png" else {"Date": None},
-        )
-    plt.close(figure)
+    figures.save(figure, folder / "stability_map.png", folder / "stability_map.svg")
     return folder / "stability_map.svg"

@@ -5,13 +5,14 @@ Every change gives a scene of the ordinary kind, so that all of them run in the 
 
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from .. import schema
 from .._core import SceneError
 from ..scene import MOTIONS, NODE_VALUES, Assembly, Scene, read_toml
-from ..units import Units
+from ..units import DIMENSIONS, Units
 
 METHODS = ["central-difference", "symplectic-euler", "noh-bathe", "rk4"]
 HEAVY = 1e18  # mass of a driven node made free, in units of what else there is: its motion is then what was given
@@ -42,6 +43,27 @@ class Variant:
         return ", ".join(parts)
 
 
+def change(table: schema.Table, **fields: Any) -> None:
+    """Sets fields of a table; all others stay."""
+    for key, value in fields.items():
+        setattr(table, key, value)
+
+
+def in_si(tables: schema.SceneTables) -> schema.SceneTables:
+    """A copy with every quantity in SI, but for the mesh."""
+    new = tables.model_copy(deep=True)
+    si, base = Units.of(tables.units).si, schema.Units()
+    change(new.units, length=base.length, mass=base.mass, time=base.time)
+    for name in schema.TABLES:
+        found = getattr(new, name)
+        for table in found if isinstance(found, list) else [found]:
+            for key in table.model_fields_set & DIMENSIONS.keys():
+                value = getattr(table, key)
+                if isinstance(value, (int, float, list)):  # and not, say, inertia = "lumped"
+                    setattr(table, key, si(key, value).tolist())
+    return new
+
+
 class Source:
     """A scene file as read, before it is compiled: `variant` and `Scene` come from it. Raises SceneError."""
 
@@ -57,8 +79,7 @@ class Source:
         except SceneError as error:
             raise SceneError(f"{self.file}: {error}") from None
         self.scene = self.compile(self.tables)  # as it is: what is wrong with it shows here
-        self.units = Units(**self.tables.units.model_dump())
-        self.gravity = self.units.si("gravity", self.tables.model.gravity)
+        self.units = Units.of(self.tables.units)
         nodes = self.scene.model.report()["nodes"]
         moving = {MOTIONS[m] for m in nodes["motion"].tolist()}
         self.any_free, self.any_driven = "free" in moving, "driven" in moving
@@ -72,31 +93,40 @@ class Source:
             raise SceneError(f"{self.file}: {error}") from None
 
     def changed(self, variant: Variant) -> schema.SceneTables:
-        """The tables of a variant that is a tie."""
+        """The tables of a variant that is a tie: a copy with the fields of its choices changed."""
         tables = self.tables.model_copy(deep=True)
-        tables.model.inertia, tables.model.geometry = variant.inertia, variant.geometry
+        change(tables.model, inertia=variant.inertia, geometry=variant.geometry)
         if variant.formulation != "scene":
             for tie in tables.tie:
-                tie.formulation = variant.formulation
+                change(tie, formulation=variant.formulation)
         if variant.freedoms == "translations":
             self.drop_rotations(tables)
         return tables
 
-    def drop_rotations(self, tables: schema.SceneTables):
+    def drop_rotations(self, tables: schema.SceneTables) -> None:
         """Nothing turns but the slaves of optimized ties; those of default ties lose their rotary inertia with it."""
         assembly = Assembly(tables, self.folder)
-        default = [
-            assembly.mesh.node_id[slaves].tolist()
-            for tie, (_, _, slaves) in zip(tables.tie, assembly.ties)
-            if tie.formulation == "default"
-        ]
-        for table in tables.node:
-            table.rotations = False if table.rotations else table.rotations
-        for slaves in default:
-            tables.node.append(schema.Node(nodes=slaves, inertia=0.0))
+        ids = assembly.mesh.node_id
+        tables.node.append(schema.Node(nodes="all", rotations=False))
+        for tie, (_, _, slaves) in zip(tables.tie, assembly.ties):
+            if tie.formulation == "default":
+                tables.node.append(schema.Node(nodes=ids[slaves].tolist(), inertia=0.0))
         for table in tables.initial:
             table.w = None
         tables.initial = [table for table in tables.initial if table.v is not None]
+
+    def tables_of(
+        self, variant: Variant, method: str, reaction: str, energy: bool = False, heavy: bool = False
+    ) -> schema.SceneTables:
+        """See `build`."""
+        tables = self.penalty(variant) if variant.penalty else self.changed(variant)
+        if heavy and self.any_driven:
+            tables = self.arrays(tables, heavy=True)
+        change(tables.model, reaction=reaction, position="integrated")
+        default = schema.Integrator()
+        change(tables.integrator, method=method, time_step=default.time_step, safety=default.safety)
+        change(tables.interface, expose=["energy"] if energy else [], hide=[])
+        return tables
 
     def build(
         self,
@@ -111,32 +141,56 @@ class Source:
         energy: expose the energies. heavy: driven nodes become free ones too heavy for anything but their given
         acceleration to move them. Raises SceneError.
         """
-        tables = self.penalty(variant) if variant.penalty else self.changed(variant)
-        if heavy and self.any_driven:
-            tables = self.arrays(tables, heavy=True)
-        tables.model.reaction, tables.model.position = reaction, "integrated"
-        tables.integrator = schema.Integrator(method=method)
-        tables.interface = schema.Interface(expose=["energy"] if energy else [])
-        scene = self.compile(tables)
-        scene.gravity = self.gravity
-        return scene
+        return self.compile(self.tables_of(variant, method, reaction, energy, heavy))
 
     def arrays(self, tables: schema.SceneTables, heavy: bool) -> schema.SceneTables:
-        """The same scene in SI with inline mesh and one node table a node, so that single nodes can be changed."""
+        """The same scene in SI with inline mesh and one node table a node, so that single nodes can be changed.
+
+        Tables are copied with changed fields: what this function knows nothing of stays as it was.
+        """
         a = Assembly(tables.model_copy(deep=True), self.folder)
-        ids, si = a.mesh.node_id, a.units.si
-        new = tables.model_copy(deep=True)
-        new.units = schema.Units()
-        new.mesh = schema.Mesh(
+        ids = a.mesh.node_id
+        new = in_si(tables)
+        change(
+            new.mesh,
+            file=None,
+            properties=None,
             nodes=[(int(i), *map(float, x)) for i, x in zip(ids, a.position)],
             segments=[
                 [int(e), *(int(ids[n]) for n in corners if n >= 0)]
                 for e, corners in zip(a.mesh.segment_id, a.mesh.segments)
             ],
         )
-        motion = [MOTIONS[m] for m in a.motion]
+        new.node = self.nodes(a, new, heavy)
+        last = {}  # of each node, the last table with initial velocities that names it
+        for number, table in enumerate(new.initial, 1):
+            last |= dict.fromkeys(a.nodes(f"initial {number}: nodes", table.nodes).tolist(), table)
+        new.initial = [
+            last[k].model_copy(update={"nodes": [int(i)], "v": v.tolist(), "w": w.tolist() if r else None})
+            for k, (i, v, w, r) in enumerate(zip(ids, a.velocity, a.spin, a.rotations))
+            if v.any() or (r and w.any())
+        ]
+        for tie, (_, segments, slaves) in zip(new.tie, a.ties):
+            change(tie, segments=a.mesh.segment_id[segments].tolist(), slaves=ids[slaves].tolist())
+        springs = []
+        for spring, (first, second) in zip(new.spring, a.springs):
+            for p, q in zip(ids[first].tolist(), second.tolist()):
+                ends = {"nodes": None, "ground": [p]} if q < 0 else {"nodes": [p, int(ids[q])], "ground": None}
+                springs.append(spring.model_copy(update=ends))
+        new.spring = springs
+        return new
+
+    @staticmethod
+    def nodes(a: Assembly, tables: schema.SceneTables, heavy: bool) -> list[schema.Node]:
+        """One node table a node: what the tables say of it, later ones over earlier ones."""
+        said: list[dict] = [{} for _ in a.mesh.node_id]
+        for number, table in enumerate(tables.node, 1):
+            keys = {key: getattr(table, key) for key in table.model_fields_set if getattr(table, key) is not None}
+            for k in a.nodes(f"node table {number}: nodes", table.nodes):
+                said[k] |= keys
         values = {key: a.values[key].copy() for key in NODE_VALUES}
-        slave = np.zeros(len(ids), bool)
+        motion = [MOTIONS[m] for m in a.motion]
+        slave = np.zeros(len(said), bool)
         for _, _, slaves in a.ties:
             slave[slaves] = True
         if heavy:
@@ -144,30 +198,14 @@ class Source:
             for key in ("mass", "inertia"):
                 values[key][driven] = HEAVY * max(1.0, a.values["mass"].max(), a.values["inertia"].max())
             motion = ["free" if d else m for d, m in zip(driven, motion)]
-        motion = [None if s else m for s, m in zip(slave, motion)]  # a slave's motion is that of its tie
-        new.node = [
-            schema.Node(nodes=[int(i)], motion=m, rotations=bool(r), **{key: float(v[k]) for key, v in values.items()})
-            for k, (i, m, r) in enumerate(zip(ids, motion, a.rotations))
-        ]
-        new.initial = [
-            schema.Initial(nodes=[int(i)], v=v.tolist(), w=w.tolist() if r else None)
-            for i, v, w, r in zip(ids, a.velocity, a.spin, a.rotations)
-            if v.any() or (r and w.any())
-        ]
-        for tie, (_, segments, slaves) in zip(new.tie, a.ties):
-            tie.segments, tie.slaves = a.mesh.segment_id[segments].tolist(), ids[slaves].tolist()
-            tie.search_distance = si("search_distance", tie.search_distance)
-        new.spring = []
-        for table, (first, second) in zip(tables.spring, a.springs):
-            for p, q in zip(first, second):
-                ends = {"ground": [int(ids[p])]} if q < 0 else {"nodes": [int(ids[p]), int(ids[q])]}
-                keys = ("stiffness", "damping") + (
-                    ("rotational_stiffness", "rotational_damping") if table.kind == "bushing" else ()
-                )
-                vector = {key: np.asarray(si(key, getattr(table, key))).tolist() for key in keys}
-                new.spring.append(schema.Spring(**ends, kind=table.kind, **vector))
-        new.model.gravity = np.asarray(si("gravity", tables.model.gravity)).tolist()
-        return new
+        return [
+            schema.Node(nodes=[int(i)]).model_copy(
+                update=said[k]
+                | {"nodes": [int(i)], "motion": None if slave[k] else motion[k], "rotations": bool(a.rotations[k])}
+                | {key: float(v[k]) for key, v in values.items()}
+            )
+            for k, i in enumerate(a.mesh.node_id)
+        ]  # a slave's motion is that of its tie
 
     def penalty(self, variant: Variant) -> schema.SceneTables:
         """Each slave becomes a free node, held by a stiff spring at the place where its tie would put it.
@@ -191,21 +229,25 @@ class Source:
         v, w = scene.start.get("slave_velocity"), scene.start.get("slave_spin") if any(turning) else None
         place = {row[0]: row[1:] for row in new.mesh.nodes}
         for node, s in slaves.items():
-            table, turns = tables[node], turning[s] and tables[node].inertia > 0
-            if not table.mass > 0:
+            table = tables[node]
+            mass, inertia = table.mass or 0.0, table.inertia or 0.0
+            turns = turning[s] and inertia > 0
+            if not mass > 0:
                 raise SceneError(f"{self.file}: node {node}: has no mass, so a penalty cannot tie it")
             new.mesh.nodes.append((ghost[node], *place[node]))
-            k = table.mass * (variant.penalty * top) ** 2
+            k = mass * (variant.penalty * top) ** 2
             new.node.append(schema.Node(nodes=[ghost[node]], motion="driven", rotations=table.rotations))
             new.spring.append(
                 schema.Spring(
                     nodes=[node, ghost[node]],
                     kind="bushing",
                     stiffness=k,
-                    rotational_stiffness=k * table.inertia / table.mass if turns else 0.0,
+                    rotational_stiffness=k * inertia / mass if turns else 0.0,
                 )
             )
-            new.initial.append(schema.Initial(nodes=[node], v=v[s].tolist(), w=w[s].tolist() if turns else None))
+            new.initial.append(
+                schema.Initial(nodes=[node], v=v[s].tolist(), w=w[s].tolist() if w is not None and turns else None)
+            )
             table.motion, table.rotations = "free", turns
         for tie in new.tie:
             tie.slaves = [ghost[node] for node in tie.slaves if node in ghost]

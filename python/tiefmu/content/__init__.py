@@ -1,18 +1,21 @@
-"""What an FMU carries beside model and binary (FMI 2.0.4, section 2.3): for people and for tools that connect FMUs."""
+"""What an FMU carries beside model and binary (FMI 2.0.4, section 2.3): for people and for tools that connect FMUs.
+
+Documentation page and licences, a picture, reference results, terminals.
+"""
 
 from importlib.metadata import distribution
 from pathlib import Path
 
-from .extras_page import page
-from .extras_picture import Picture
-from .extras_reference import reference
-from .extras_terminals import terminals
-from .scene import Scene
+from ..scene import Scene
+from .documentation import page
+from .picture import Picture
+from .reference_results import reference
+from .terminals import terminals
 
-LICENSES = Path(__file__).parent / "licenses"
+LICENSES = Path(__file__).parents[1] / "licenses"
 
 
-def extras(scene: Scene, found: dict, step: float) -> dict[str, bytes]:
+def content(scene: Scene, found: dict, step: float) -> dict[str, bytes]:
     """Path in the archive -> bytes. found: the scene's report; step: of the default experiment, s."""
     picture = Picture(scene.model.report())
     files = {

@@ -4,8 +4,9 @@ from pathlib import Path
 
 import numpy as np
 
+from .. import figures
 from . import page
-from .speed_accuracy import Row, read
+from .speed_accuracy_runs import Row, read
 
 # Colours that colour-blind readers tell apart (Okabe and Ito).
 COLOURS = {
@@ -155,11 +156,9 @@ CPU, EVALUATIONS = "CPU time per simulated second [s/s]", "force evaluations per
 
 def main_figure(rows: list[Row]):
     """The scene's own formulation in finite geometry: four panels."""
-    import matplotlib.pyplot as plt
-
     own = [row for row in rows if (row.formulation, row.geometry, row.freedoms) == ("scene", "finite", "all")]
     driven = any(row.method == "held input" for row in own)
-    figure, axes = plt.subplots(2, 2, figsize=(11, 8.4), layout="constrained")
+    figure, axes = figures.pyplot().subplots(2, 2, figsize=(11, 8.4), layout="constrained")
     evaluations = "communication steps per simulated second [1/s]" if driven else EVALUATIONS
     over = "step" if driven else "step_over_limit"
     first, second = ("error_f", "error_v") if driven else ("error_v", "error_f")  # given motions are hardly wrong
@@ -200,14 +199,12 @@ def main_figure(rows: list[Row]):
 def formulations_figure(rows: list[Row]):
     """Everything else: one panel per formulation and geometry, velocities over evaluations. None where there is
     nothing else."""
-    import matplotlib.pyplot as plt
-
     kinds = list(dict.fromkeys((row.formulation, row.geometry) for row in rows))
     if len(kinds) < 2:
         return None
     columns = 2
     lines = (len(kinds) + 1) // columns
-    figure, axes = plt.subplots(
+    figure, axes = figures.pyplot().subplots(
         lines, columns, figsize=(11, 0.8 + 3.3 * lines), layout="constrained", sharex=True, sharey=True, squeeze=False
     )
     driven = any(row.method == "held input" for row in rows)
@@ -232,8 +229,6 @@ def formulations_figure(rows: list[Row]):
 
 def model_figure(rows: list[Row]):
     """What each simplification costs at any step: bars of the model error."""
-    import matplotlib.pyplot as plt
-
     bars = [
         (("" if row.formulation == "scene" else f"{row.formulation}: ") + name_of(row), row.model_v, row.model_f)
         for row in rows
@@ -241,7 +236,7 @@ def model_figure(rows: list[Row]):
     ]
     if not bars:
         return None
-    figure, axis = plt.subplots(figsize=(11, 1.2 + 0.42 * len(bars)), layout="constrained")
+    figure, axis = figures.pyplot().subplots(figsize=(11, 1.2 + 0.42 * len(bars)), layout="constrained")
     for k, (_, v, f) in enumerate(bars):
         axis.barh(k + 0.18, max(v, 1e-12), 0.34, color="#0072B2", label="slave velocities" if k == 0 else None)
         axis.barh(k - 0.18, max(f, 1e-12), 0.34, color="#E69F00", label="loads on masters" if k == 0 else None)
@@ -270,19 +265,8 @@ FIGURES = [
 
 def draw(table: Path) -> list[tuple[str, Path]]:
     """Draws the charts of a CSV beside it, as SVG and PNG; (caption, SVG) of each."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
-
-    plt.rcParams.update(
-        {
-            "svg.hashsalt": "tiefmu",
-            "svg.fonttype": "none",
-            "font.size": 10,
-            "axes.spines.top": False,
-            "axes.spines.right": False,
-        }
+    figures.pyplot().rcParams.update(
+        {"svg.fonttype": "none", "font.size": 10, "axes.spines.top": False, "axes.spines.right": False}
     )
     rows, result = read(table), []
     for suffix, function, caption in FIGURES:
@@ -291,9 +275,7 @@ def draw(table: Path) -> list[tuple[str, Path]]:
             continue
         figure.suptitle(f"{rows[0].scene}: {caption.split(':')[0].rstrip('.').lower()}")
         path = table.with_name(f"{table.stem}{suffix}.svg")
-        figure.savefig(path, metadata={"Date": None})
-        figure.savefig(path.with_suffix(".png"), dpi=90, metadata={"Software": None})
-        plt.close(figure)
+        figures.save(figure, path, path.with_suffix(".png"), dpi=90)
         result.append((caption, path))
     return result
 

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from .scene import Scene
+from ..scene import Scene
 
 MOST_VARIABLES = 2000
 STEPS = 20
@@ -21,7 +21,12 @@ def reference(scene: Scene, step: float) -> dict[str, bytes]:
         return {}
     times = step * np.arange(STEPS + 1)
     inputs = signals(scene, times)
-    outputs = [name for block in variables if block["causality"] == "output" for name in names(block)]
+    outputs = [
+        name
+        for number, block in enumerate(variables)
+        if block["causality"] == "output"
+        for name in scene.start.variable_names(number)
+    ]
     simulation = scene.simulation()
     answer = None
     rows = []
@@ -43,19 +48,6 @@ def reference(scene: Scene, step: float) -> dict[str, bytes]:
     }
 
 
-def names(block: dict) -> list[str]:
-    """FMU names of a block's variables, in the order of memory."""
-    name = block["name"].removeprefix(block["prefix"] + ".")
-    components = [f"[{k}]" for k in (1, 2, 3)] if block["components"] == 3 else [""]
-    if not block["prefix"]:
-        return [block["name"]]
-    return [
-        f"{block['prefix']}[{number}].{name}{k}"
-        for number in block["labels"] or block["numbers"].tolist()
-        for k in components
-    ]
-
-
 def signals(scene: Scene, times: np.ndarray) -> dict[str, np.ndarray]:
     """Name -> values over time: a sine with a phase of its own for each node and direction; positions, velocities and
     accelerations are each other's derivatives."""
@@ -74,13 +66,14 @@ def signals(scene: Scene, times: np.ndarray) -> dict[str, np.ndarray]:
         "t": force * size,
     }
     found = {}
-    for block in scene.start.variables:
+    for number, block in enumerate(scene.start.variables):
         if block["causality"] != "input":
             continue
+        names = scene.start.variable_names(number)
         kind = block["name"].removeprefix(block["prefix"] + ".").removesuffix("_ext")
         ahead = {"r": 0, "v": 1, "a": 2, "w": 1, "z": 2}.get(kind, 0) * math.pi / 2  # derivatives run ahead
-        start = scene.simulation().get_values(names(block)) if kind == "r" else np.zeros(3 * len(block["numbers"]))
-        for k, name in enumerate(names(block)):
+        start = scene.simulation().get_values(names) if kind == "r" else np.zeros(3 * len(block["numbers"]))
+        for k, name in enumerate(names):
             phase = 0.7 * (3 * int(block["numbers"][k // 3]) + k % 3) + ahead
             still = math.sin(phase) if kind == "r" else 0.0
             found[name] = start[k] + amplitude[kind] * (np.sin(omega * times + phase) - still)

@@ -1,6 +1,6 @@
 """terminalsAndIcons.xml: what belongs to one node, as one plug. FMI 2.0.4 takes the file as FMI 3.0 defines it."""
 
-from .scene import Scene
+from ..scene import Scene
 
 
 def terminals(scene: Scene) -> bytes:

@@ -1,18 +1,17 @@
 """A picture of a scene at its start, as SVG and as PNG: segments, masters, slaves and what they are tied to.
 
-Drawn here and not by matplotlib, whose import takes longer than all of a build.
+Not by matplotlib, whose import takes longer than all of a build.
 """
 
-import struct
-import zlib
+import io
 
 import numpy as np
+from PIL import Image, ImageDraw
 
 LABELLED = 30  # nodes: with more of them ids would hide the picture
-FILLED = 2000  # segments: with more of them a PNG has their edges only
+DETAILED = 4000  # segments and slaves: with more of them a PNG has thin lines and points
 WIDTH, HEIGHT, MARGIN = 480, 360, 24
 FACE, EDGE, SLAVE = "#dde8f2", "#445566", "#bb4400"
-COLOURS = ["#ffffff", FACE, EDGE, SLAVE]
 
 
 class Picture:
@@ -67,22 +66,27 @@ class Picture:
 
     def png(self) -> bytes:
         """The same without ids. Drawn twice as large and averaged, which smooths the edges."""
-        canvas = np.zeros((HEIGHT * 2, WIDTH * 2), np.uint8)  # indexes of COLOURS
-        segments = [corners * 2 for corners in self.segments]
-        if len(segments) <= FILLED:
-            for corners in segments:
-                fill(canvas, corners, COLOURS.index(FACE))
-        edges = np.vstack(
-            [np.hstack([corners, np.roll(corners, -1, axis=0)]) for corners in segments] or [np.zeros((0, 4))]
-        )
-        many = len(self.slaves) + len(self.masters) > LABELLED
-        lines(canvas, edges[:, :2], edges[:, 2:], COLOURS.index(EDGE), 1)
-        lines(canvas, self.feet * 2, self.slaves * 2, COLOURS.index(SLAVE), 1)
-        lines(canvas, self.masters * 2, self.masters * 2, COLOURS.index(EDGE), 2 if many else 5)
-        lines(canvas, self.slaves * 2, self.slaves * 2, COLOURS.index(SLAVE), 2 if many else 6)
-        palette = np.array([[int(colour[k : k + 2], 16) for k in (1, 3, 5)] for colour in COLOURS], np.uint16)
-        quarters = [palette[canvas[i::2, j::2]] for i in (0, 1) for j in (0, 1)]
-        return png((sum(quarters) // 4).astype(np.uint8))
+        image = Image.new("RGB", (2 * WIDTH, 2 * HEIGHT), "white")
+        draw = ImageDraw.Draw(image)
+        many = len(self.segments) + len(self.slaves) > DETAILED
+        width = 1 if many else 3
+        for corners in self.segments:
+            outline = (2 * corners).ravel().tolist()
+            if not many:
+                draw.polygon(outline, fill=FACE)
+            draw.line([*outline, *outline[:2]], EDGE, width)
+        for ends in np.hstack([2 * self.feet, 2 * self.slaves]).tolist():
+            draw.line(ends, SLAVE, width)
+        few = len(self.slaves) + len(self.masters) <= LABELLED
+        for colour, radius, points in ((EDGE, 5, self.masters), (SLAVE, 6, self.slaves)):
+            if many:
+                draw.point((2 * points).ravel().tolist(), colour)
+                continue
+            for centre in (2 * points).tolist():
+                draw.circle(centre, radius if few else 2, fill=colour)
+        file = io.BytesIO()
+        image.reduce(2).save(file, "PNG")
+        return file.getvalue()
 
 
 def projection(points: np.ndarray):
@@ -97,47 +101,3 @@ def projection(points: np.ndarray):
     room = np.array([WIDTH - 2 * MARGIN, HEIGHT - 2 * MARGIN])
     scale = min((r / e for r, e in zip(room.tolist(), extent.tolist()) if e > 0), default=1.0)
     return lambda p: (p @ view - middle) * [scale, -scale] + [WIDTH / 2, HEIGHT / 2]
-
-
-def fill(canvas: np.ndarray, corners: np.ndarray, colour: int):
-    """A convex polygon: pixels on the same side of every edge."""
-    low = np.maximum(np.floor(corners.min(axis=0)).astype(int), 0)
-    high = np.ceil(corners.max(axis=0)).astype(int) + 1
-    part = canvas[low[1] : high[1], low[0] : high[0]]
-    y, x = low[1] + np.arange(part.shape[0])[:, None], low[0] + np.arange(part.shape[1])
-    left, right = np.ones(part.shape, bool), np.ones(part.shape, bool)
-    for a, b in zip(corners, np.roll(corners, -1, axis=0)):
-        side = (b[0] - a[0]) * (y - a[1]) - (b[1] - a[1]) * (x - a[0])
-        left &= side >= 0
-        right &= side <= 0
-    part[left | right] = colour
-
-
-def lines(canvas: np.ndarray, a: np.ndarray, b: np.ndarray, colour: int, half: int):
-    """Lines from each a to each b, of 2 half + 1 pixels; a point where both are one."""
-    counts = np.ceil(np.abs(b - a).max(axis=1, initial=0)).astype(int) + 1
-    which = np.repeat(np.arange(len(a)), counts)
-    along = (np.arange(len(which)) - np.repeat(np.cumsum(counts) - counts, counts)) / np.maximum(counts[which] - 1, 1)
-    at = np.round(a[which] + along[:, None] * (b - a)[which]).astype(int)
-    for dx in range(-half, half + 1):
-        for dy in range(-half, half + 1):
-            if dx * dx + dy * dy <= half * half + 1:
-                x, y = at[:, 0] + dx, at[:, 1] + dy
-                seen = (x >= 0) & (x < canvas.shape[1]) & (y >= 0) & (y < canvas.shape[0])
-                canvas[y[seen], x[seen]] = colour
-
-
-def png(pixels: np.ndarray) -> bytes:
-    """(height, width, 3) uint8 as a PNG file."""
-    height, width, _ = pixels.shape
-
-    def chunk(kind: bytes, data: bytes) -> bytes:
-        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
-
-    rows = np.hstack([np.zeros((height, 1), np.uint8), pixels.reshape(height, -1)]).tobytes()  # 0: unfiltered
-    return (
-        b"\x89PNG\r\n\x1a\n"
-        + chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0))
-        + chunk(b"IDAT", zlib.compress(rows, 3))
-        + chunk(b"IEND", b"")
-    )

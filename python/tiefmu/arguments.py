@@ -1,0 +1,36 @@
+"""Types and checks of command-line arguments."""
+
+import argparse
+import math
+from pathlib import Path
+
+from .errors import UsageError
+
+
+def positive(text: str) -> float:
+    """A finite number above 0. Raises ArgumentTypeError."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not 0 < value < math.inf:
+        raise argparse.ArgumentTypeError(f"'{text}' is not a positive number")
+    return value
+
+
+def is_fmu(name: str) -> bool:
+    return name.lower().endswith(".fmu")
+
+
+def existing(name: str) -> Path:
+    """Raises UsageError where there is no such file."""
+    path = Path(name)
+    if not path.is_file():
+        raise UsageError(f"{name}: no such file")
+    return path
+
+
+def check_folder_of(path: Path) -> None:
+    """Raises UsageError where the file could not be written because its folder is missing."""
+    if not path.parent.is_dir():
+        raise UsageError(f"{path}: folder {path.parent} does not exist")

@@ -1,0 +1,13 @@
+"""Every error that tiefmu raises on purpose. Messages are one line that names file, table or option, and id."""
+
+from ._core import Diverged, SceneError, StepTooLong
+
+__all__ = ["Diverged", "RunError", "SceneError", "StepTooLong", "UsageError"]
+
+
+class UsageError(ValueError):
+    """What was asked for cannot be done: an option out of range, a missing folder, a file of another kind."""
+
+
+class RunError(Exception):
+    """A co-simulation that cannot start or did not finish."""

@@ -1,0 +1,243 @@
+"""A scene coupled to a host: the packaged FMU over communication steps, against the monolithic system."""
+
+import math
+import time
+from dataclasses import dataclass
+
+import numpy as np
+
+from .. import schema
+from .._core import Diverged, SceneError
+from ..scene import Scene
+from .coupling_reference import Reference, relative
+from .hosts import EXTRAPOLATIONS, Coupling, InProcess, Masses, Packaged
+from .limits import GROWS
+from .variants import Source, change
+
+OMEGA = 1000.0  # rad/s, of each of the host's masters on its ground spring, or of the exchanged spring; at least
+ZETA = 0.05  # of the host
+EXCHANGE_ZETA = 0.25
+WINDOW = 2.0  # simulated time in radians of that spring
+AMPLITUDE = 1e-4  # of the mean edge of a segment: what is seen is the coupling, not the geometry
+REACTIONS = ["loads", "full", "split", "spring-damper"]
+LARGEST_MATRIX = 200  # rows of a one-step map
+MAX_STEPS = 6000  # of a run in its place
+
+
+@dataclass
+class Row:
+    scene: str
+    host: str
+    reaction: str  # or "spring-damper": force exchange with massless slaves on springs and dampers to ground
+    extrapolation: str  # of the tie's loads, by the host
+    mass_ratio: float  # slaves over masters
+    step: float  # s
+    step_omega: float  # rad
+    steps: int
+    error_velocity: float  # of the slaves, relative L2 over the trajectory, against the monolithic system
+    error_force: float  # of the tie's loads on the masters
+    error_final: float  # of the slaves' velocities at the end
+    power_residual: float  # W, rms over the communication points: sum f.v with the load the host used, minus with
+    power_residual_relative: float  # the one the tie answers; relative to the rms of the interface's power
+    radius: float  # growth per step: spectral radius of the one-step map, or of a run where that is too large
+    status: str  # "stable", "unstable" (radius > 1, but the run is short) or "diverged" (no errors, no cost)
+    cpu: float  # s per simulated second
+
+
+class Study:
+    """A scene whose driven masters a host takes over, with pulses on its slaves. Raises SceneError."""
+
+    def __init__(self, path, host: str = "sprung", mass_ratio: float | None = None):
+        self.source, self.host = Source(path), host
+        if not self.source.any_driven:
+            raise SceneError(
+                f"{path}: has no driven masters, so there is nothing for a host to move; "
+                'motion = "driven" in a [[node]] table gives them to the host'
+            )
+        self.base = self.source.arrays(self.source.tables, heavy=False)
+        self.base.initial = []
+        change(self.base.model, gravity=[0.0, 0.0, 0.0], position="input")
+        change(self.base.interface, expose=[], hide=[])
+        tie = InProcess(self.scene("loads"))
+        found = self.source.scene.model.report()
+        self.slaves = found["slaves"]["id"][np.argsort(found["slaves"]["number"])].tolist()
+        self.tied = float(found["slaves"]["mass"].sum())
+        n = 3 * len(tie.names.driven)
+        host_mass = float(tie.own[:n:3].sum())
+        if mass_ratio and not tie.own[:n].all():  # no masses to scale: equal ones
+            tie.own[:n], host_mass = self.tied / (mass_ratio * n / 3), self.tied / mass_ratio
+        for k in np.flatnonzero(tie.own <= 0):
+            place = k // 3 if k < n else tie.names.driven.index(tie.names.turning[(k - n) // 3])
+            what = "mass" if k < n else "inertia"
+            raise SceneError(
+                f"{path}: master {tie.node_ids[place]}: has no {what} of its own, which a host needs; "
+                f"give {what} in a [[node]] table" + (", or --mass-ratio" if what == "mass" else "")
+            )
+        self.own = tie.own * (self.tied / (mass_ratio * host_mass) if mass_ratio and self.tied > 0 else 1.0)
+        self.ratio = self.tied / float(self.own[:n:3].sum())
+        self.translations, self.node_ids, self.names = n, tie.node_ids.tolist(), tie.names
+        self.omega = max(OMEGA, self.own_frequency())
+        self.window = WINDOW / self.omega
+        self.force = AMPLITUDE * self.edge() * self.omega**2 * float(self.own[:n:3].sum()) / len(self.slaves)
+        self.direction = np.tile([1.0, 0.5, -2.0], len(self.slaves))
+
+    def edge(self) -> float:
+        place = {row[0]: np.array(row[1:], float) for row in self.base.mesh.nodes}
+        return float(
+            np.mean(
+                [
+                    np.linalg.norm(place[a] - place[b])
+                    for _, *s in self.base.mesh.segments
+                    for a, b in zip(s, s[1:] + s[:1])
+                ]
+            )
+        )
+
+    def pulse(self, t: float) -> float:
+        """0 before the start, with its first three derivatives, so that an extrapolation's past is exact."""
+        return math.sin(math.pi * t / self.window) ** 4 if t > 0 else 0.0
+
+    def own_frequency(self) -> float:
+        """Highest frequency of the scene's own springs with free masters, rad/s."""
+        tables = self.tables("full")
+        for node in tables.node:
+            if node.nodes[0] in self.node_ids:
+                k = self.node_ids.index(node.nodes[0])
+                node.motion, node.mass = "free", float(self.own[3 * k])
+        return 2 / float(self.source.compile(tables).start.get("stable_time_step")[0])
+
+    def tables(self, reaction: str) -> schema.SceneTables:
+        """SI tables of the scene in this reaction mode, with lumped inertia in `loads`."""
+        tables = self.base.model_copy(deep=True)
+        if reaction == "spring-damper":
+            change(tables.model, reaction="loads", inertia="lumped")
+            for table in tables.node:
+                if table.nodes[0] in self.slaves:
+                    table.mass = table.inertia = 0.0
+            share = float(self.own[: self.translations : 3].sum()) / len(self.slaves)
+            tables.spring += [
+                schema.Spring(
+                    ground=[slave],
+                    kind="bushing",
+                    stiffness=share * self.omega**2,
+                    damping=2 * EXCHANGE_ZETA * share * self.omega,
+                )
+                for slave in self.slaves
+            ]
+        else:
+            change(tables.model, reaction=reaction, inertia="lumped" if reaction == "loads" else "consistent")
+        return tables
+
+    def scene(self, reaction: str, geometry: str | None = None) -> Scene:
+        tables = self.tables(reaction)
+        if geometry:
+            change(tables.model, geometry=geometry)
+        return self.source.compile(tables)
+
+    def masses(self, reaction: str, added: np.ndarray) -> Masses:
+        """The host carries D but in `full`; translations are sprung unless it is rigid or the exchange is a spring."""
+        sprung = self.own * (np.arange(len(self.own)) < self.translations)
+        sprung = sprung * (self.host == "sprung" and reaction != "spring-damper")
+        return Masses(
+            self.own + (0.0 if reaction == "full" else 1.0) * added,
+            sprung * self.omega**2,
+            sprung * 2 * ZETA * self.omega,
+        )
+
+    def rows(self, steps: list[int]):
+        """One Row for each reaction, extrapolation and number of steps."""
+        references = {}
+        for reaction in REACTIONS:
+            kind = "spring-damper" if reaction == "spring-damper" else "tie"
+            if kind not in references:
+                references[kind] = Reference(self, reaction)
+            linear = InProcess(self.scene(reaction, "small"))
+            with Packaged(self.scene(reaction)) as tie:
+                for order, extrapolation in enumerate(EXTRAPOLATIONS):
+                    for count in steps:
+                        yield self.row(tie, linear, references[kind], reaction, order, extrapolation, count)
+
+    def row(
+        self,
+        tie: Packaged,
+        linear: InProcess,
+        reference: "Reference",
+        reaction: str,
+        order: int,
+        extrapolation: str,
+        count: int,
+    ) -> Row:
+        size, host = self.window / count, self.masses(reaction, tie.added)
+        probe = Coupling(linear, host, size, order)
+        radius = self.rate(probe)
+        row = Row(
+            scene=self.source.name,
+            host=self.host,
+            reaction=reaction,
+            extrapolation=extrapolation,
+            mass_ratio=self.ratio,
+            step=size,
+            step_omega=size * self.omega,
+            steps=count,
+            error_velocity=math.nan,
+            error_force=math.nan,
+            error_final=math.nan,
+            power_residual=math.nan,
+            power_residual_relative=math.nan,
+            radius=radius,
+            status="diverged",
+            cpu=math.nan,
+        )
+        run = self.simulate(tie, host, size, order, count)
+        if run is None:
+            return row
+        velocity, load, residual, cpu = run
+        times = np.arange(count + 1) * size
+        exact_velocity, exact_load, _exact_power = (reference.at(times, key) for key in ("velocity", "load", "power"))
+        if not relative(velocity, exact_velocity) < 10:
+            return row
+        row.error_velocity, row.error_force = relative(velocity, exact_velocity), relative(load, exact_load)
+        row.error_final = relative(velocity[-1:], exact_velocity[-1:])
+        row.power_residual = float(np.sqrt(np.mean(residual[1:] ** 2)))
+        row.power_residual_relative = row.power_residual / reference.power_rms
+        row.cpu, row.status = cpu, "stable" if radius <= GROWS else "unstable"
+        return row
+
+    def rate(self, probe: Coupling) -> float:
+        """Growth per step: by the spectral radius; by a run of eight periods of the host where the tie keeps a state
+        that the one-step map leaves out or the matrix is large, unless that takes too many steps."""
+        steps = max(400, math.ceil(16 * math.pi / (probe.size * self.omega)))
+        large = probe.rest().size > LARGEST_MATRIX
+        if large or (probe.tie.keeps_state and steps <= MAX_STEPS):
+            return probe.growth(min(steps, MAX_STEPS))
+        return probe.radius()
+
+    def simulate(self, tie: Packaged, host: Masses, size: float, order: int, count: int):
+        """(slave velocities, loads of the tie on the masters, power residuals) at the communication points, and CPU s
+        per s; or None where it diverges."""
+        tie.restart()
+        coupling = Coupling(tie, host, size, order)
+        state, used = coupling.rest(), None
+        carried = host.mass - self.own
+        velocity = np.empty((count + 1, len(self.direction)))
+        load, residual = np.empty((count + 1, len(self.own))), np.zeros(count + 1)
+        bound = 1e6 * AMPLITUDE * self.edge() * self.omega
+        start = time.process_time()
+        for n in range(count + 1):
+            tie.push(self.force * self.pulse(n * size) * self.direction)
+            answer = coupling.load(state)
+            velocity[n] = tie.slave_velocity()
+            load[n] = answer - carried * state[2]
+            if used is not None:
+                residual[n] = (used - answer) @ state[1]
+            if n == count:
+                break
+            following, used = coupling.advance(state, answer)
+            if not abs(following[1]).max() < bound:
+                return None
+            try:
+                tie.carry((state[1] + following[1]) / 2, n * size, size)
+            except Diverged:
+                return None
+            state = following
+        return velocity, load, residual, (time.process_time() - start) / self.window
