@@ -153,7 +153,7 @@ void Dynamics::prepare() {
     }
   }
   prepareMass();
-  setForceVelocities(0, true);
+  setForceVelocities(0, 0);
 }
 
 void Dynamics::prepareMass() {
@@ -414,13 +414,14 @@ void Dynamics::inertialLoads() {
   for (int s = 0; s < model.turning(); ++s) at(zs_.data(), s) *= -inertia[s];
 }
 
-void Dynamics::setForceVelocities(double ahead, bool both) {
+void Dynamics::setForceVelocities(double aheadOfLagged, double aheadOfPredicted) {
   for (Field f : {Field::lagged, Field::predicted}) {
     if (!has(f)) continue;
     double *v = field(f), *w = v + 3 * model.nodes();
     std::copy_n(field(Field::velocity), layout[Field::velocity].count, v);
     std::copy_n(field(Field::spin), layout[Field::spin].count, w);
-    if (ahead == 0 || (f == Field::lagged && !both)) continue;
+    const double ahead = f == Field::lagged ? aheadOfLagged : aheadOfPredicted;
+    if (ahead == 0) continue;
     const double *a = field(Field::acceleration), *z = field(Field::angularAcceleration);
     for (int i = 3 * model.freeBegin(); i < 3 * model.freeEnd(); ++i) v[i] += ahead * a[i];
     for (int i = 3 * model.freeBegin(); i < 3 * model.rotating(); ++i) w[i] += ahead * z[i];

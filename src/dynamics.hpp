@@ -42,9 +42,9 @@ class Dynamics {
   // nodes' accelerations, with `predicted` velocities in the bias.
   void evaluate();
   void evaluateReactions();  // T^T f_s only
-  // Sets `lagged` and `predicted`, where this model has them, from velocity and spin, plus ahead * acceleration for
-  // the second and, if `both`, for the first.
-  void setForceVelocities(double ahead, bool both);
+  // Sets `lagged` and `predicted`, where this model has them, from velocity and spin plus so many seconds of the
+  // accelerations.
+  void setForceVelocities(double aheadOfLagged, double aheadOfPredicted);
   void takeDrivenVelocities();  // the driven part of the same, after inputs have changed
 
   // v += h a over the free nodes.

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "stability.hpp"
+
 namespace tiefmu {
 
 Integrator::Integrator(Dynamics& dynamics) : dynamics_(dynamics) {
@@ -19,13 +21,13 @@ bool Integrator::step(double tau, double h) {
   Dynamics& d = dynamics_;
   switch (d.model.settings.method) {
     case Method::centralDifference:
-      // Half kick, drift, half kick. Dampers see the half-step velocity; the bias, which is quadratic in it, sees it
-      // extrapolated to the end of the step, without which the order would drop to one.
+      // Half kick, drift, half kick. Dampers and the bias see the half-step velocity extrapolated to the end of the
+      // step, without which the order would drop to one; dampers only as far as the step stays stable.
       d.kick(0.5 * h);
       d.inputsOver(tau, h);
       d.drift(h, 0);
       d.inputsAt(tau, h);
-      d.setForceVelocities(0.5 * h, false);
+      d.setForceVelocities(0.5 * h * prediction(h), 0.5 * h);
       d.evaluate();
       d.kick(0.5 * h);
       return true;
@@ -34,7 +36,7 @@ bool Integrator::step(double tau, double h) {
       d.inputsOver(tau, h);
       d.drift(h, 0);
       d.inputsAt(tau, h);
-      d.setForceVelocities(0, true);
+      d.setForceVelocities(0, 0);
       return false;
     case Method::nohBathe: {
       const double h1 = nohBathe::p * h, h2 = (1 - nohBathe::p) * h;
@@ -43,7 +45,7 @@ bool Integrator::step(double tau, double h) {
       d.inputsOver(tau, h1);
       d.drift(h1, 0.5 * h1);
       d.inputsAt(tau, h1);
-      d.setForceVelocities(h1, true);
+      d.setForceVelocities(h1, h1);
       d.kick(0.5 * h1);
       std::copy_n(a, earlier_.size(), earlier_.begin());
       d.evaluate();
@@ -51,7 +53,7 @@ bool Integrator::step(double tau, double h) {
       d.inputsOver(tau + h1, h2);
       d.drift(h2, 0.5 * h2);
       d.inputsAt(tau + h1, h2);
-      d.setForceVelocities(h2, true);
+      d.setForceVelocities(h2, h2);
       // v += h2 (q0 a_0 + (1/2 + q1) a_1 + q2 a_2)
       d.kick((0.5 + nohBathe::q1) * h2);
       std::swap_ranges(earlier_.begin(), earlier_.end(), a);
@@ -66,6 +68,13 @@ bool Integrator::step(double tau, double h) {
   return false;
 }
 
+// Half of the margin that the safety factor keeps is left to what changes between two looks at the highest frequency.
+double Integrator::prediction(double h) {
+  const double safety = std::min(1.0, *dynamics_.field(Field::safety));
+  return damperPrediction(2 / (1 + safety) * h, *dynamics_.field(Field::highestFrequency),
+                          *dynamics_.field(Field::dampingRate));
+}
+
 void Integrator::rungeKutta(double tau, double h) {
   Dynamics& d = dynamics_;
   static_assert(allAre(Field::velocity, Field::work, Role::motion, Role::state));
@@ -78,7 +87,7 @@ void Integrator::rungeKutta(double tau, double h) {
       for (std::size_t k = 0; k < size; ++k) y[k] = start_[k] + ahead[stage - 1] * h * rates_[k];
       d.inputsAt(tau, ahead[stage - 1] * h);
       d.updateGeometry();
-      d.setForceVelocities(0, true);
+      d.setForceVelocities(0, 0);
       d.evaluate();
     }
     d.rates(rates_.data());
@@ -91,7 +100,7 @@ void Integrator::rungeKutta(double tau, double h) {
   d.inputsAt(tau, h);
   d.normalise();
   d.updateGeometry();
-  d.setForceVelocities(0, true);
+  d.setForceVelocities(0, 0);
 }
 
 }  // namespace tiefmu

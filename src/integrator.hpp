@@ -26,6 +26,7 @@ class Integrator {
 
  private:
   void rungeKutta(double tau, double h);
+  double prediction(double h);  // beta of a central difference step
 
   Dynamics& dynamics_;
   std::vector<double> start_, rates_, sum_;  // of a Runge-Kutta step: the fields velocity .. work

@@ -379,7 +379,11 @@ void Simulation::outputRates(double* rates) {
         for (std::size_t k = 0; k < s.layout[motion].count; ++k)
           if (const std::size_t place = s.layout[motion].offset + k; !s.dynamics.inputs.knows(place))
             setInputDerivative(place, 1, s.field(rate)[k]);
-    // Two steps: what the outputs hold of an earlier step's half-step velocities is gone after the first.
+    // Nothing of an earlier step's half-step velocities; what the outputs hold of their start is gone after the first
+    // of two steps.
+    s.dynamics.setForceVelocities(0, 0);
+    s.flags &= ~accelerationsValid;
+    s.loadsDirty = true;
     std::vector<InputDerivatives> inputs = s.dynamics.inputs.all();
     step(h);
     updateOutputs();

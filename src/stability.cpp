@@ -73,6 +73,11 @@ double stableStep(Method method, double omega, double c) {
   return low * scale;
 }
 
+double damperPrediction(double h, double omega, double c) {
+  if (!(c > 0)) return 1;
+  return std::clamp((4 - omega * omega * h * h) / (2 * c * h) - 1, 0.0, 1.0);
+}
+
 double nodalStep(const Model& model, const double* addedMass, const double* addedInertia, const double* stiffness,
                  const double* rotationalStiffness) {
   double smallest = none;

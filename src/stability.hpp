@@ -11,6 +11,10 @@ namespace tiefmu {
 // Euler with the damping force of the lagged half step that is 2/omega (sqrt(1 + z^2) - z), z = c / (2 omega).
 double stableStep(Method method, double omega, double c);
 
+// beta of the velocity v_(n-1/2) + beta (h/2) a_(n-1) that dampers see in a central difference step: the largest one of
+// [0, 1] that step h (s) is stable with (0 where none is), theory (6.5). At beta = 1 the method is of second order.
+double damperPrediction(double h, double omega, double c);
+
 // Theory (6.3): the smallest sqrt(2 m/K), sqrt(2 I/Kr) over the free master nodes, s (1e30: no stiffness).
 double nodalStep(const Model& model, const double* addedMass, const double* addedInertia, const double* stiffness,
                  const double* rotationalStiffness);

@@ -144,10 +144,21 @@ def test_project(n, seed):
         close(kernels.shape(n, p.xi, p.eta), shape(n, p.xi, p.eta))
 
 
-def amplification(method, h, omega, c):
-    """Spectral radius of one step on x'' = -omega^2 x - c x' with the damping force of the lagged velocity."""
-    if method == "central-difference":  # as velocity at half steps; symplectic Euler is the same map
-        step = np.array([[1 - h * h * omega**2, h - h * h * c], [-h * omega**2, 1 - h * c]])
+def predicted_step(h, stiffness, damping, beta):
+    """Central difference on x'' = -K x - C x' as a map of (x, h v_(n-1/2), h^2 a_(n-1)): dampers see
+    v_(n-1/2) + beta h/2 a_(n-1)."""
+    n = len(stiffness)
+    one, none = np.eye(n), np.zeros((n, n))
+    k, c = h * h * np.asarray(stiffness), h * np.asarray(damping)
+    acceleration = np.hstack([-k, -c, -0.5 * beta * c])
+    velocity = np.hstack([none, one, none]) + acceleration
+    return np.vstack([np.hstack([one, none, none]) + velocity, velocity, acceleration])
+
+
+def amplification(method, h, omega, c, beta=0.0):
+    """Spectral radius of one step on x'' = -omega^2 x - c x'."""
+    if method == "central-difference":  # symplectic Euler is the same map at beta = 0
+        step = predicted_step(h, [[omega**2]], [[c]], beta)
     else:
         a = np.array([[0, 1], [-(omega**2), -c]]) * h
         step = np.eye(2) + a + a @ a / 2 + a @ a @ a / 6 + a @ a @ a @ a / 24
@@ -170,3 +181,36 @@ def test_limits_with_damping(method, zeta):
     assert amplification(method, 1.001 * h, omega, c) > 1
     if method == "central-difference":
         assert h == pytest.approx(2 / omega * (np.sqrt(1 + zeta**2) - zeta), rel=1e-9)
+
+
+@pytest.mark.parametrize("zeta", [0.01, 0.05, 0.2, 0.5, 1.0, 3.0])
+def test_damper_prediction_is_the_largest_stable(zeta):
+    """Stable with its beta at every step up to the limit, which a predicted velocity does not lower; with a larger one
+    not; 1 (second order) at small steps, 0 at the limit and beyond."""
+    omega, c = 5.0, 2 * zeta * 5.0
+    limit = kernels.stable_step("central-difference", omega, c)
+    for part in (0.01, 0.1, 0.3, 0.5, 0.7, 0.9, 0.97, 0.999):
+        beta = kernels.damper_prediction(part * limit, omega, c)
+        assert amplification("central-difference", part * limit, omega, c, beta) <= 1 + 1e-9
+        if beta < 1:
+            assert amplification("central-difference", part * limit, omega, c, 1.02 * beta + 1e-3) > 1
+    assert kernels.damper_prediction(0.01 * limit, omega, c) == 1.0
+    assert kernels.damper_prediction(limit, omega, c) == pytest.approx(0.0, abs=1e-12)
+    assert kernels.damper_prediction(1.1 * limit, omega, c) == 0.0
+    assert kernels.damper_prediction(limit, omega, 0.0) == 1.0
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_damper_prediction_of_many_freedoms(seed):
+    """Dampers that are not proportional: the largest omega and c bound every step."""
+    rng = np.random.default_rng(seed)
+    for _ in range(50):
+        n = rng.integers(2, 7)
+        a, b = rng.normal(size=(2, n, n)) * 10.0 ** rng.uniform(-1, 1, (2, 1, 1))
+        stiffness = a @ a.T
+        damping = b[:, : rng.integers(1, n + 1)]
+        damping = damping @ damping.T
+        omega, c = np.sqrt(np.linalg.eigvalsh(stiffness)[-1]), np.linalg.eigvalsh(damping)[-1]
+        h = rng.uniform(0.1, 1.0) * kernels.stable_step("central-difference", omega, c)
+        beta = kernels.damper_prediction(h, omega, c)
+        assert np.abs(np.linalg.eigvals(predicted_step(h, stiffness, damping, beta))).max() <= 1 + 1e-7

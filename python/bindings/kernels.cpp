@@ -270,4 +270,6 @@ void bindKernels(nb::module_& parent) {
         throw nb::value_error("unknown method");
       },
       "method"_a, "omega"_a, "c"_a = 0.0, "Largest stable step (s) on x'' = -omega^2 x - c x'.");
+  m.def("damper_prediction", &damperPrediction, "h"_a, "omega"_a, "c"_a,
+        "beta in [0, 1] of the velocity v_(n-1/2) + beta h/2 a_(n-1) of the dampers in a central difference step.");
 }

@@ -11,7 +11,7 @@ ITEMS = {
     "1": "mass ratio, reaction 'full'",
     "2": "mass ratio, reactions 'split' and 'loads'",
     "3": "spring-damper exchange, force held",
-    "4": "integrators, lagged damping, penalty tie",
+    "4": "integrators, damping, penalty tie",
     "5": "nodal rule with an offset",
     "6": "orientation",
     "7": "spinning offset",
@@ -218,7 +218,7 @@ def integrator_limits() -> list[Limit]:
         found.append(
             Limit(
                 "4",
-                f"central-difference, lagged damping, zeta = {zeta:g}",
+                f"central-difference, damped, zeta = {zeta:g}",
                 "omega dt",
                 2 * (np.sqrt(1 + zeta**2) - zeta),
                 lambda x, r=run: r.grows(x / 20),
