@@ -77,6 +77,22 @@ def test_translations_alone_do_not_fix_a_node_that_turns(tmp_path):
     assert column(read(made, tmp_path), "motion")[1] == "driven"
 
 
+def test_three_translations_fix_a_node_that_cannot_turn(tmp_path):
+    nodes = {1: (0, 0, 0), 2: (1, 0, 0), 3: (0, 1, 0), 4: (0, 0, -1), 11: (0.2, 0.2, 0)}
+    made = RadiossDeck().nodes(nodes).elastic().solid().part().elements("TETRA4", 1, {1: (1, 2, 3, 4)})
+    made.node_group(1, [11]).surface(1, "PART/EXT", [1]).tie(1, 1, 1).node_group(2, [1]).node_group(3, [2])
+    made.block("/BCS/1", ("   111 000", 0, 2), ("   111 100", 0, 3), title="held")
+    found = column(read(made, tmp_path), "motion")
+    assert (found[1], found[2], found[3]) == ("fixed", "fixed", "driven")
+
+
+def test_what_is_moved_is_not_fixed(tmp_path):
+    made = deck().node_group(2, [1]).block("/BCS/1", ("   111 111", 0, 2), title="all six")
+    made.block("/FUNCT/1", (0.0, 1.0), (1.0, 1.0), title="one")
+    made.block("/IMPDISP/1", (1, "         X", 0, 0, 2), (1.0, 1.0), title="pulled")
+    assert column(read(made, tmp_path), "motion")[1] == "driven"
+
+
 def test_a_rigid_body_is_a_port(tmp_path):
     made = (
         deck()

@@ -156,9 +156,7 @@ def hold(deck: Deck, slave: np.ndarray, master: np.ndarray, loose: np.ndarray) -
     for one in deck.fixed:
         held[one.nodes] |= np.array([*one.translations, *one.rotations])
     fixed = held.all(axis=1)
-    three = held[:, :3].all(axis=1) & ~held[:, 3:].any(axis=1)
-    rotating = rotating_nodes(deck)
-    fixed |= three & ~rotating
+    fixed |= held[:, :3].all(axis=1) & ~rotating_nodes(deck)
     tied = np.flatnonzero(slave & held.any(axis=1))
     if len(tied):
         deck.warn(
