@@ -28,12 +28,10 @@ double lambdaAtStart(const Model& model, const TieGroup& group, int e) {
   return nodeInertia(group.corners, x).lambda;
 }
 
-}  // namespace
-
-void lumpedAdditions(const Model& model, const double* slaveMass, const double* slaveInertia, double* mass,
-                     double* inertia) {
-  std::fill(mass, mass + model.nodes(), 0.0);
-  std::fill(inertia, inertia + model.rotating(), 0.0);
+// Calls add(slave, corner, node, mass, inertia, does the node get inertia?) for every corner of every slave's segment.
+// [theory (4.1), (4.2)]
+template <class Add>
+void eachAddition(const Model& model, const double* slaveMass, const double* slaveInertia, Add add) {
   double lambda = 0;
   const TieGroup* lastGroup = nullptr;
   int lastSegment = -1;
@@ -47,13 +45,34 @@ void lumpedAdditions(const Model& model, const double* slaveMass, const double* 
         lastGroup = &group;
         lastSegment = e;
       }
-      for (int i = 0; i < n; ++i) mass[node[i]] += m / n + (own + m * d2) * lambda;
+      for (int i = 0; i < n; ++i) add(s, i, node[i], m / n + (own + m * d2) * lambda, 0.0, false);
       return;
     }
     const Phi phi = clamped(n, &group.weight[static_cast<std::size_t>(n) * k]);
-    for (int i = 0; i < n; ++i) mass[node[i]] += phi[i] * m;
-    if (group.coupling == Coupling::rotation)
-      for (int i = 0; i < n; ++i) inertia[node[i]] += phi[i] * (own + m * d2);
+    const bool turns = group.coupling == Coupling::rotation;
+    for (int i = 0; i < n; ++i) add(s, i, node[i], phi[i] * m, turns ? phi[i] * (own + m * d2) : 0.0, turns);
+  });
+}
+
+}  // namespace
+
+void lumpedAdditions(const Model& model, const double* slaveMass, const double* slaveInertia, double* mass,
+                     double* inertia) {
+  std::fill(mass, mass + model.nodes(), 0.0);
+  std::fill(inertia, inertia + model.rotating(), 0.0);
+  eachAddition(model, slaveMass, slaveInertia, [&](int, int, int node, double m, double j, bool turns) {
+    mass[node] += m;
+    if (turns) inertia[node] += j;
+  });
+}
+
+void lumpedAdditionsBySlave(const Model& model, const double* slaveMass, const double* slaveInertia, double* mass,
+                            double* inertia) {
+  std::fill(mass, mass + 4 * model.slaves(), 0.0);
+  std::fill(inertia, inertia + 4 * model.slaves(), 0.0);
+  eachAddition(model, slaveMass, slaveInertia, [&](int s, int corner, int, double m, double j, bool) {
+    mass[4 * s + corner] = m;
+    inertia[4 * s + corner] = j;
   });
 }
 

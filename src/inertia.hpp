@@ -13,6 +13,11 @@ namespace tiefmu {
 void lumpedAdditions(const Model& model, const double* slaveMass, const double* slaveInertia, double* mass,
                      double* inertia);
 
+// The same apart for each slave and corner of its segment: four masses and inertias a slave, 0 where a triangle has no
+// fourth corner. [theory (4.1), (4.2)]
+void lumpedAdditionsBySlave(const Model& model, const double* slaveMass, const double* slaveInertia, double* mass,
+                            double* inertia);
+
 // Nodal stiffness K_i (N/m) and Kr_i (N m/rad): declared, plus the springs', plus the slaves' shares. [theory (6.1),
 // (6.2)]
 void nodalStiffness(const Model& model, double* translation, double* rotation);

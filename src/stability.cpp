@@ -78,15 +78,16 @@ double damperPrediction(double h, double omega, double c) {
   return std::clamp((4 - omega * omega * h * h) / (2 * c * h) - 1, 0.0, 1.0);
 }
 
+double nodalStep(double inertia, double stiffness) { return stiffness > 0 ? std::sqrt(2 * inertia / stiffness) : none; }
+
 double nodalStep(const Model& model, const double* addedMass, const double* addedInertia, const double* stiffness,
                  const double* rotationalStiffness) {
   double smallest = none;
   for (int group : {rotatingFreeMaster, freeMaster})
     for (int i = model.begin[group]; i < model.begin[group + 1]; ++i) {
-      if (stiffness[i] > 0)
-        smallest = std::min(smallest, std::sqrt(2 * (model.nodeMass[i] + addedMass[i]) / stiffness[i]));
-      if (i < model.rotating() && rotationalStiffness[i] > 0)
-        smallest = std::min(smallest, std::sqrt(2 * (model.nodeInertia[i] + addedInertia[i]) / rotationalStiffness[i]));
+      smallest = std::min(smallest, nodalStep(model.nodeMass[i] + addedMass[i], stiffness[i]));
+      if (i < model.rotating())
+        smallest = std::min(smallest, nodalStep(model.nodeInertia[i] + addedInertia[i], rotationalStiffness[i]));
     }
   return smallest;
 }

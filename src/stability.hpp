@@ -15,6 +15,9 @@ double stableStep(Method method, double omega, double c);
 // [0, 1] that step h (s) is stable with (0 where none is), theory (6.5). At beta = 1 the method is of second order.
 double damperPrediction(double h, double omega, double c);
 
+// Theory (6.3) of one node: sqrt(2 m/K), or sqrt(2 I/Kr), s (1e30: no stiffness).
+double nodalStep(double inertia, double stiffness);
+
 // Theory (6.3): the smallest sqrt(2 m/K), sqrt(2 I/Kr) over the free master nodes, s (1e30: no stiffness).
 double nodalStep(const Model& model, const double* addedMass, const double* addedInertia, const double* stiffness,
                  const double* rotationalStiffness);

@@ -13,9 +13,11 @@
 #include <unordered_map>
 
 #include "compile.hpp"
+#include "inertia.hpp"
 #include "resource.hpp"
 #include "segment.hpp"
 #include "simulation.hpp"
+#include "stability.hpp"
 #include "variables.hpp"
 #include "xml.hpp"
 
@@ -192,7 +194,8 @@ nb::dict reportSlaves(const Model& model) {
   const std::size_t n = model.slaveReport.size();
   std::vector<std::int64_t> segment(n), node(4 * n, 0);
   std::vector<std::int32_t> tie(n), coupling(n), corners(n);
-  std::vector<double> xi(n), eta(n), distance(n), length(n), condition(n), lambda(n), weight(4 * n), inside(4 * n);
+  std::vector<double> xi(n), eta(n), distance(n), length(n), condition(n), lambda(n), weight(4 * n);
+  std::vector<double> addedMass(4 * n), addedInertia(4 * n);
   std::vector<std::uint8_t> clamped(n);
   for (std::size_t s = 0; s < n; ++s) {
     const SlaveReport& r = model.slaveReport[s];
@@ -214,17 +217,17 @@ nb::dict reportSlaves(const Model& model) {
         const std::size_t s = static_cast<std::size_t>(g.firstSlave) + k;
         coupling[s] = static_cast<std::int32_t>(g.coupling);
         corners[s] = g.corners;
-        const Phi clampedPhi = tiefmu::clamped(g.corners, &g.weight[corner * k]);
         for (std::size_t i = 0; i < corner; ++i) {
           node[4 * s + i] = model.nodeId[static_cast<std::size_t>(g.node[corner * e + i])];
           weight[4 * s + i] = g.weight[corner * k + i];
-          inside[4 * s + i] = clampedPhi[i];
         }
         condition[s] = inertia.condition;
         lambda[s] = inertia.lambda;
       }
     }
   }
+  lumpedAdditionsBySlave(model, model.slaveMass.data(), model.slaveInertia.data(), addedMass.data(),
+                         addedInertia.data());
   nb::dict d;
   d["id"] = numpy(model.slaveId);
   d["number"] = numpy(model.slaveNumber);
@@ -234,7 +237,8 @@ nb::dict reportSlaves(const Model& model) {
   d["corners"] = numpy(std::move(corners));
   d["nodes"] = numpy(std::move(node), {n, 4});
   d["weights"] = numpy(std::move(weight), {n, 4});
-  d["clamped_weights"] = numpy(std::move(inside), {n, 4});
+  d["added_mass"] = numpy(std::move(addedMass), {n, 4});
+  d["added_inertia"] = numpy(std::move(addedInertia), {n, 4});
   d["xi"] = numpy(std::move(xi));
   d["eta"] = numpy(std::move(eta));
   d["distance"] = numpy(std::move(distance));
@@ -475,6 +479,8 @@ NB_MODULE(_core, m) {
           },
           "guid"_a, "sink"_a, "Calls sink(bytes) with the text, piece by piece.")
       .def_prop_ro("step_size", &Xml::stepSize, "Of the default experiment, s.");
+  m.def("nodal_step", nb::overload_cast<double, double>(&nodalStep), "inertia"_a, "stiffness"_a,
+        "sqrt(2 m/K) or sqrt(2 I/Kr) of a node, s [theory (6.3)]; 1e30 where nothing limits it.");
   m.def("model_identifier", &modelIdentifier, "name"_a, "The C identifier that an FMU of this name uses.");
 
   nb::class_<Simulation::State>(m, "State", "A saved state; only for `restore` of a simulation of the same model.")

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from . import _core
 from .errors import UsageError
 from .scene import MOTIONS, Scene
 
@@ -67,20 +68,10 @@ def ties(scene: Scene, found: dict) -> list[dict]:
 
 def slave_rows(scene: Scene, found: dict, order: np.ndarray) -> list[dict]:
     s = {key: value[order] for key, value in found["slaves"].items()}
-    n, m, inertia = s["corners"], s["mass"], s["inertia"]
-    rotary = inertia + m * s["d"] ** 2  # I_s + m_s d^2
+    n = s["corners"]
     optimized = s["coupling"] == found["couplings"].index("meanMotion")
-    turns_masters = s["coupling"] == found["couplings"].index("rotation")
-    # Lumped additions, theory (4.1) and (4.2).
     corner = np.arange(4) < n[:, None]
     share = np.where(optimized[:, None], corner / n[:, None], s["weights"])
-    with np.errstate(invalid="ignore", over="ignore"):  # lambda may be infinite where no optimized tie uses it
-        mean = m / n + rotary * s["lambda"]
-    added_mass = np.where(
-        optimized[:, None], corner * np.where(optimized, mean, 0.0)[:, None], s["clamped_weights"] * m[:, None]
-    )
-    added_inertia = np.where(turns_masters[:, None], s["clamped_weights"] * rotary[:, None], 0.0)
-
     names = [table.name for table in scene.ties]
     columns = {
         "id": s["id"].tolist(),
@@ -99,7 +90,9 @@ def slave_rows(scene: Scene, found: dict, order: np.ndarray) -> list[dict]:
         "lambda": finite(s["lambda"]),
     }
     rows = []
-    for k, masses, inertias, *values in zip(n.tolist(), added_mass.tolist(), added_inertia.tolist(), *columns.values()):
+    for k, masses, inertias, *values in zip(
+        n.tolist(), s["added_mass"].tolist(), s["added_inertia"].tolist(), *columns.values()
+    ):
         row = dict(zip(columns, values))
         row["nodes"], row["weights"] = row["nodes"][:k], row["weights"][:k]
         row["added"] = [{"node": row["nodes"][i], "mass": masses[i], "inertia": inertias[i]} for i in range(k)]
@@ -132,11 +125,13 @@ def node_rows(scene: Scene, nodes: dict, master: bool) -> list[dict]:
             "stiffness": float(stiffness[i]),
             "rotational_stiffness": 0.0,
         }
-        steps = [nodal_step(mass + row["added_mass"], row["stiffness"])]
+        steps = [_core.nodal_step(mass + row["added_mass"], row["stiffness"])]
         if i < rotating:
             row["added_inertia"] = float(added_inertia[i])
             row["rotational_stiffness"] = float(rotational_stiffness[i])
-            steps.append(nodal_step(float(nodes["inertia"][i]) + row["added_inertia"], row["rotational_stiffness"]))
+            steps.append(
+                _core.nodal_step(float(nodes["inertia"][i]) + row["added_inertia"], row["rotational_stiffness"])
+            )
         row["nodal_time_step"] = min(steps)
         rows.append(row)
     return rows
@@ -173,11 +168,6 @@ def port_rows(scene: Scene, found: dict) -> list[dict]:
             }
         rows.append(row)
     return rows
-
-
-def nodal_step(mass: float, stiffness: float) -> float:
-    """sqrt(2 m/K), theory (6.3); 1e30 where nothing limits it."""
-    return (2 * mass / stiffness) ** 0.5 if stiffness > 0 else 1e30
 
 
 def freedoms(scene: Scene, nodes: dict) -> dict:
