@@ -13,7 +13,8 @@ spring: mass, inertia, per_length, and vectors of three: stiffness, damping, rot
 rotational_damping; type: axial (only the first counts), general, beam (shear turns its ends)
 """
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -32,11 +33,12 @@ class Nodal:
     rotational_stiffness: np.ndarray
     rotations: np.ndarray
     where: str = ""  # of the elements that are added, for messages
-    element: np.ndarray | None = None
+    element: np.ndarray = field(default_factory=lambda: np.empty(0, np.int64))
 
     @staticmethod
     def zeros(n: int) -> "Nodal":
-        return Nodal(*(np.zeros(n) for _ in range(4)), np.zeros(n, bool))
+        mass, inertia, stiffness, rotational_stiffness = np.zeros((4, n))
+        return Nodal(mass, inertia, stiffness, rotational_stiffness, np.zeros(n, bool))
 
     def add(self, nodes: np.ndarray, mass=0.0, inertia=0.0, stiffness=0.0, rotational_stiffness=0.0):
         """Adds to each of `nodes` (n, k): values per element (n) or per corner (n, k)."""
@@ -333,7 +335,7 @@ def damped_stiffness(k: np.ndarray, c: np.ndarray, m: np.ndarray) -> np.ndarray:
     return np.where(m > 0, (np.sqrt(c * c + k * m) + c) ** 2 / m, k)
 
 
-FUNCTIONS = {
+FUNCTIONS: dict[str, Callable[..., None]] = {
     "shell4": shell4,
     "shell3": shell3,
     "hex8": brick,

@@ -7,6 +7,7 @@ decided here, and said in the deck's notes and warnings.
 import re
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -238,7 +239,7 @@ def masters_rotate(deck: Deck, tie: Tie, values: Nodal, slaves: np.ndarray) -> n
     """Whether the face nearest to each slave, by its centre, has rotations at all of its nodes."""
     nodes = tie.faces.nodes
     four = np.where(nodes < 0, nodes[:, [2]], nodes)
-    whole = values.rotations[four].all(axis=1)
+    whole = np.asarray(values.rotations[four].all(axis=1))
     if whole.all() or not whole.any():
         return np.full(len(slaves), whole.all())
     centre = deck.position[four].mean(axis=1)
@@ -270,7 +271,7 @@ def tie_table(deck: Deck, tie: Tie, written: Written, scale: Scale) -> dict:
     wanted = np.sort(np.where(tie.faces.nodes < 0, 0, deck.node_id[tie.faces.nodes]), axis=1)
     place = match_rows(np.sort(written.segments, axis=1), wanted)
     written.segment_sets[main] = np.sort(written.segment_id[np.unique(place)])
-    table = {
+    table: dict[str, Any] = {
         "name": tie.name,
         "segments": main,
         "slaves": slaves,
@@ -281,7 +282,7 @@ def tie_table(deck: Deck, tie: Tie, written: Written, scale: Scale) -> dict:
     if tie.search_distance is not None:
         table["search_distance"] = scale.number("search_distance", tie.search_distance)
     if tie.pairwise is not None:
-        tolerance = pair_tolerance(deck, tie)
+        tolerance = pair_tolerance(deck, tie, tie.pairwise[0])
         largest = np.maximum(
             tolerance["diagonal"].max(), tie.pairwise[1] * (tolerance["t_s"].max() + tolerance["t_m"].max())
         )
@@ -293,7 +294,7 @@ def tie_table(deck: Deck, tie: Tie, written: Written, scale: Scale) -> dict:
     return table
 
 
-def pair_tolerance(deck: Deck, tie: Tie) -> dict:
+def pair_tolerance(deck: Deck, tie: Tie, share: float) -> dict:
     """What the tolerance of a pair consists of: share of the shorter diagonal and thickness of each face, and of each
     slave the largest thickness of its shells. In the deck's units."""
     four = np.where(tie.faces.nodes < 0, tie.faces.nodes[:, [2]], tie.faces.nodes)
@@ -307,7 +308,7 @@ def pair_tolerance(deck: Deck, tie: Tie) -> dict:
             nodes = elements.nodes.ravel()
             np.maximum.at(thick, nodes[nodes >= 0], t[nodes >= 0])
     return {
-        "diagonal": tie.pairwise[0] * diagonals.min(axis=0),
+        "diagonal": share * diagonals.min(axis=0),
         "t_m": tie.faces.thickness,
         "slave": deck.node_id[tie.slaves],
         "t_s": thick[tie.slaves],

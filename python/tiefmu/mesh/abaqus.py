@@ -166,8 +166,8 @@ class InputFile:
         instance = options.get("INSTANCE", "")
         self.scope.add(sets, name, [])
         if sets is self.scope.node_sets and options.get("ELSET"):
-            line = SetLine(np.empty(0, np.int64), [options["ELSET"]], instance=instance, elements=True)
-            self.scope.add(sets, name, [line])
+            elements = SetLine(np.empty(0, np.int64), [options["ELSET"]], instance=instance, elements=True)
+            self.scope.add(sets, name, [elements])
         if "GENERATE" in options:
             for line in lines:
                 self.scope.add(sets, name, [SetLine(generated(name, line), [], instance=instance)])

@@ -223,10 +223,10 @@ class Assembly:
         return rows
 
     def nodes_of(self, rows: np.ndarray) -> np.ndarray:
-        nodes = [NONE]
+        found = [NONE]
         for number, block in enumerate(self.blocks):
-            nodes.append(block.nodes[rows[self.block_of[rows] == number] - self.first_row[number]].ravel())
-        nodes = np.unique(np.concatenate(nodes))
+            found.append(block.nodes[rows[self.block_of[rows] == number] - self.first_row[number]].ravel())
+        nodes = np.unique(np.concatenate(found))
         return nodes[nodes != 0]
 
     def surface(self, scope: Scope, name: str) -> tuple:

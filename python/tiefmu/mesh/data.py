@@ -199,7 +199,7 @@ class Mesh:
                 if not plain:
                     index = self.outer_faces(solids)
             elif wanted in file.face_sets:
-                index, solids = self.segments_of_faces(*file.face_sets[wanted]), []
+                index, solids = self.segments_of_faces(*file.face_sets[wanted]), np.empty(0, int)
             elif wanted in file.element_sets:
                 rows = file.element_sets[wanted]
                 index, solids = self.segment_of[rows], self.solid_rows(rows)
@@ -238,10 +238,10 @@ class Mesh:
 
     def nodes_of_rows(self, rows: np.ndarray) -> np.ndarray:
         """Ids of the nodes of elements, mid-side nodes too."""
-        ids = [np.empty(0, np.int64)]
+        found = [np.empty(0, np.int64)]
         for number, block in enumerate(self.content.blocks):
-            ids.append(block.nodes[rows[self.block_of[rows] == number] - self.first_row[number]].ravel())
-        ids = np.unique(np.concatenate(ids))
+            found.append(block.nodes[rows[self.block_of[rows] == number] - self.first_row[number]].ravel())
+        ids = np.unique(np.concatenate(found))
         return ids[ids != 0]
 
     # segments that are faces of solids

@@ -10,7 +10,7 @@ import numpy as np
 
 CORNERS = {"triangle": 3, "quad": 4, "tetra": 4, "pyramid": 5, "wedge": 6, "hexahedron": 8}
 
-FACES = {  # corners of face 1, 2, ..., counted from 1
+FACES: dict[str, list[tuple[int, ...]]] = {  # corners of face 1, 2, ..., counted from 1
     "tetra": [(1, 2, 3), (1, 4, 2), (2, 4, 3), (3, 4, 1)],
     "pyramid": [(1, 2, 3, 4), (1, 5, 2), (2, 5, 3), (3, 5, 4), (4, 5, 1)],
     "wedge": [(1, 2, 3), (4, 6, 5), (1, 4, 5, 2), (2, 5, 6, 3), (3, 6, 4, 1)],

@@ -6,6 +6,7 @@ their names only. A group without a name is called by its number; groups of one 
 
 import struct
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -111,7 +112,7 @@ class Reader:
         self.groups_of: dict[tuple[int, int], list[int]] = {}  # (dimension, entity) -> its physical groups
         self.node_id, self.position = [], []
         self.blocks: list[Block] = []
-        self.tags: list[list[tuple[int, np.ndarray]]] = []  # per block: (group, indices in the block)
+        self.tags: list[list[tuple[str, np.ndarray]]] = []  # per block: (group, indices in the block)
         at = 0
         self.binary = self.new = False
         self.order = "<"
@@ -185,9 +186,9 @@ class Reader:
     def read_nodes_2(self, source):
         count = int(source.line())
         if isinstance(source, Binary):
-            rows = source.array([("id", "i4"), ("x", "f8", 3)], count)
-            self.node_id.append(rows["id"].astype(np.int64))
-            self.position.append(rows["x"].astype(float))
+            table = source.array([("id", "i4"), ("x", "f8", 3)], count)
+            self.node_id.append(table["id"].astype(np.int64))
+            self.position.append(table["x"].astype(float))
             return
         rows = [line.split() for line in source.lines(count)]
         self.node_id.append(ids([row[0] for row in rows]))
@@ -219,15 +220,15 @@ class Reader:
 
     def read_elements_2(self, source):
         count = int(source.line())
-        grouped: dict[tuple[int, int], list] = {}  # (type, number of tags) -> rows
+        grouped: dict[tuple[int, int], list[Any]] = {}  # (type, number of tags) -> rows
         if isinstance(source, Binary):
             while count > 0:
                 kind, number, tags = source.whole(3)
                 if kind not in TYPES or not 0 < number <= count:
                     raise ValueError(f"{number} elements of type {kind}")
                 columns = 1 + tags + TYPES[kind][1]
-                rows = source.array("i4", number * columns).reshape(number, columns).astype(np.int64)
-                grouped.setdefault((kind, tags), []).append(rows)
+                table = source.array("i4", number * columns).reshape(number, columns).astype(np.int64)
+                grouped.setdefault((kind, tags), []).append(table)
                 count -= number
             tables = {key: np.concatenate(rows) for key, rows in grouped.items()}
         else:
@@ -277,8 +278,8 @@ class Reader:
         for start, tags in zip(starts, self.tags):
             for name, where in tags:
                 members.setdefault(name, []).append(start + where)
-        for (_, number), name in self.names.items():
-            members.setdefault(name or str(number), [])
+        for (_, number), given in self.names.items():
+            members.setdefault(given or str(number), [])
         sets = Sets()
         for name, rows in members.items():
             sets[name] = np.unique(np.concatenate([np.empty(0, int), *rows]))

@@ -61,7 +61,7 @@ def converted(mesh) -> MeshFile:
     for cells in mesh.cells:
         n = len(cells.data)
         nodes = nodes_of(cells, node_id)
-        shape = re.match("[a-z]*", cells.type)[0]
+        shape = re.sub("[^a-z].*", "", cells.type)
         if shape == "polygon":
             shape = {3: "triangle", 4: "quad"}.get(nodes.shape[1], "other")
         is_segment = shape in ("triangle", "quad")

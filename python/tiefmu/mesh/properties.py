@@ -10,6 +10,7 @@ stiffness, rotational_stiffness (numbers in the scene's units, 0 or more), motio
 import csv
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -20,7 +21,7 @@ from .data import find, span
 NUMBERS = ("mass", "inertia", "stiffness", "rotational_stiffness")
 MOTIONS = ("driven", "free", "fixed")  # as enum class Motion in src/scene.hpp
 COLUMNS = ("id", *NUMBERS, "motion", "rotations")
-WORDS = {
+WORDS: dict[str, dict[str, Any]] = {
     "motion": {name: number for number, name in enumerate(MOTIONS)},
     "rotations": {"true": True, "false": False, "1": True, "0": False},
 }
@@ -69,12 +70,12 @@ class Table:
         nodes = find(node_id, ids)
         missing = np.flatnonzero(nodes < 0)
         if len(missing):
-            row = missing[0]
+            row = int(missing[0])
             raise SceneError(f"{self.where(row, 'id')}: node {ids[row]} is not in the mesh{span(node_id)}")
         order = np.argsort(nodes, kind="stable")
         twice = order[1:][nodes[order][1:] == nodes[order][:-1]]
         if len(twice):
-            row = twice.min()
+            row = int(twice.min())
             raise SceneError(f"{self.where(row, 'id')}: node {ids[row]} is repeated")
         found_columns = {}
         for key, column in self.raw.items():
@@ -111,7 +112,7 @@ class Table:
             try:
                 values = np.array(list(map(float, items)), float)
             except ValueError:
-                row = next(row for row in given if not is_float(column[row]))
+                row = next(row for row in given.tolist() if not is_float(column[row]))
                 raise SceneError(f"{self.where(row, key)}: expected a number, found {found(column[row])}") from None
         for bad, words in (
             (~np.isfinite(values), "is not a finite number"),

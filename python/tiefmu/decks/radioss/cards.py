@@ -8,6 +8,7 @@ its first card since.
 import math
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import NoReturn
 
 import numpy as np
 
@@ -82,7 +83,7 @@ class Block:
         file = next((file for first, file in reversed(self.files) if first <= card), self.file)
         return f"{file}: line {number}: {shortened(self.name)}"
 
-    def fail(self, text: str, card: int | None = None):
+    def fail(self, text: str, card: int | None = None) -> NoReturn:
         raise SceneError(f"{self.where if card is None else self.at(card)}: {text}")
 
     def word(self, place: int) -> str:
@@ -152,8 +153,7 @@ class Cards:
         `integers` columns come first, then `blank` columns of an integer's width, then `reals`. Blank cards are left
         out."""
         source = self.block.source
-        index = range(self.first + start, len(self.block.lines), step)
-        lines = [self.block.lines[i] for i in index]
+        lines = self.block.lines[self.first + start :: step]
         wide = source.integer * (integers + blank) + source.real * reals
         if not lines:
             return np.empty((0, integers), np.int64), np.empty((0, reals)), np.empty(0, int)
@@ -260,7 +260,8 @@ class Reader:
     """Reads files one into the other; `block` is the one that cards go to."""
 
     def __init__(self, source: Source):
-        self.source, self.blocks, self.block = source, [], None
+        self.source, self.blocks = source, []
+        self.block: Block | None = None
         self.offsets, self.open = [Offsets()], []
 
     def read(self, path: Path, name: str):
@@ -298,10 +299,11 @@ class Reader:
         while len(words) > 2 and not words[-1]:
             words.pop()
         if line.startswith(b"//"):
-            words = self.submodel(name, number, [words[2].upper(), *words[3:]] if len(words) > 2 else [""])
-            if words is None:
+            inner = self.submodel(name, number, [words[2].upper(), *words[3:]] if len(words) > 2 else [""])
+            if inner is None:
                 self.block = None
                 return
+            words = inner
         else:
             words = words[1:]
             words[:2] = [word.upper() for word in words[:2]]

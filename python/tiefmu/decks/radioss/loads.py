@@ -62,13 +62,13 @@ def admas(deck: Deck, sets: Sets, block: Block):
     kind = block.word(1) if len(block.key) > 2 else "0"
     if not kind.isdecimal():
         block.fail(f"expected a type from 0 to 7, found '{kind}'")
-    kind, (_, cards) = int(kind), block.titled()
-    if kind in (0, 1):
+    what, (_, cards) = int(kind), block.titled()
+    if what in (0, 1):
         mass, number = cards.read(0, "ri")
         nodes = group(sets, number, block)
         if len(nodes):
-            deck.added_mass.append((nodes, mass / len(nodes) if kind == 1 else mass))
-    elif kind == 2:
+            deck.added_mass.append((nodes, mass / len(nodes) if what == 1 else mass))
+    elif what == 2:
         mass, number = cards.read(0, "ri")
         faces = sets.faces(number + block.offsets.other, block)
         four = np.where(faces.nodes < 0, faces.nodes[:, [2]], faces.nodes)
@@ -77,7 +77,7 @@ def admas(deck: Deck, sets: Sets, block: Block):
         for column in range(4):
             given = faces.nodes[:, column] >= 0
             deck.added_mass.append((faces.nodes[given, column], (mass * area / corners)[given]))
-    elif kind == 5:
+    elif what == 5:
         for card in range(len(cards)):
             mass, node = cards.read(card, "ri")
             if node:

@@ -89,14 +89,14 @@ def read_elements(deck: Deck, blocks: list[Block]):
             block.fail(f"element {ids[0]}: part {part} is not in the deck", int(index[0]))
         found.setdefault(kind, []).append((ids, corners, np.full(len(ids), part), thickness, block))
     for kind, groups in found.items():
-        columns = [np.concatenate([group[i] for group in groups]) for i in range(4)]
-        order = np.argsort(columns[0], kind="stable")
-        twice = order[1:][columns[0][order][1:] == columns[0][order][:-1]]
+        parts = [np.concatenate([group[i] for group in groups]) for i in range(4)]
+        order = np.argsort(parts[0], kind="stable")
+        twice = order[1:][parts[0][order][1:] == parts[0][order][:-1]]
         if len(twice):
             ends = np.cumsum([len(group[0]) for group in groups])
             block = groups[int(np.searchsorted(ends, twice[0], side="right"))][4]
-            block.fail(f"element {columns[0][twice[0]]} is repeated")
-        deck.elements[kind] = Elements(kind, *columns)
+            block.fail(f"element {parts[0][twice[0]]} is repeated")
+        deck.elements[kind] = Elements(kind, *parts)
 
 
 def read_parts(deck: Deck, blocks: list[Block]) -> dict[int, int]:

@@ -146,7 +146,7 @@ class Sets:
             if card < len(cards):
                 corners.append(cards.read(card, "rrr"))
         if kind == "RECTA" and len(corners) == 2 and not any(first):
-            low, high = np.minimum(*corners), np.maximum(*corners)
+            low, high = np.min(corners, axis=0), np.max(corners, axis=0)
             return ((x >= low) & (x <= high)).all(axis=1)
         if kind == "SPHER" and corners and not any(first[:3]):
             return np.linalg.norm(x - corners[0], axis=1) <= first[3] / 2

@@ -57,7 +57,7 @@ def read(deck: Deck, begin: Block | None):
     mass, length, time = words
     found = (unit(length, "m", 1.0), unit(mass, "g", 1e-3), unit(time, "s", 1.0))
     for word, value in zip((length, mass, time), found):
-        if value is None:
+        if value is None and begin is not None:
             begin.fail(f"'{word}' is no unit", 2)
     deck.units = found
     return found
