@@ -213,3 +213,10 @@ def test_mesh_files_that_are_none(file, line, weld):
     with pytest.raises(tiefmu.SceneError) as error:
         tiefmu.load(weld)
     assert str(error.value) == f"scene: mesh: file: {file}: {line}"
+
+
+def test_every_slave_dropped(weld, scene_file, capsys):
+    weld["mesh"]["nodes"][-1] = [101, 5.0, 5.0, 0.0]
+    weld["tie"][0]["unresolved"] = "drop"
+    line = line_of(scene_file, capsys, weld)
+    assert line.startswith("tie 'weld': every slave was dropped, so nothing is left; slave 101: no segment found ")
