@@ -6,6 +6,7 @@
 # make tools  install other people's tools that the tests run FMUs in
 # make study  measure speed, accuracy and stability, write charts and tables to docs/study/
 # make sanitize  100,000 random sequences of calls under sanitizers (make test: 2,000)
+# make projections  1,000,000 random quads against a search in extended precision (make test: 20,000)
 # make fuzz   60 s of fuzzing of resources, serialised states and scene files
 # make bench  time the kernels, the FMU calls and what grows with a scene, write bench/latest.csv and docs/bench.svg
 # Bench counts instructions too.
@@ -18,7 +19,7 @@ SOURCES := CMakeLists.txt $(wildcard src/*.?pp modelDescription/*.?pp fmu/*.?pp 
 # Each set in an environment of its own; not compiled ahead, as most of their files are never imported.
 TOOLS := build/tools/importers/installed build/tools/cofmupy/installed
 
-.PHONY: demo test instructions lint format tools study sanitize fuzz bench valgrind clean
+.PHONY: demo test instructions lint format tools study sanitize projections fuzz bench valgrind clean
 demo: $(VENV)/installed
 	$(BIN)/tiefmu demo --out out
 
@@ -45,6 +46,10 @@ study: $(VENV)/installed
 SEQUENCES ?= 100000
 sanitize: $(VENV)/installed
 	TIEFMU_SEQUENCES=$(SEQUENCES) $(BIN)/python -m pytest -s tests/test_sanitizers.py
+
+QUADS ?= 1000000
+projections: $(VENV)/installed
+	TIEFMU_QUADS=$(QUADS) $(BIN)/python -m pytest -s tests/test_projection.py
 
 # Clang brings libFuzzer.
 CLANG ?= $(or $(shell command -v clang++ || command -v clang++-14),clang++)

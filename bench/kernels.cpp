@@ -20,6 +20,7 @@
 #include <vector>
 
 #include "compile.hpp"
+#include "ordering.hpp"
 #include "search.hpp"
 #include "simulation.hpp"
 #include "timing.hpp"
@@ -182,11 +183,12 @@ void search(int slaves, bool shuffled) {
         [&] {
           found = 0;
           const SegmentSearch search(scene.nodes.position, scene.segments.nodes, scene.segments.id);
-          const double reach = search.defaultDistance();
-          for (int s : wanted) {
-            const Vec3& x = scene.nodes.position[s];
-            found +=
-                (method == SearchMethod::box ? search.box(x, reach) : search.nearestNode(x, 2 * reach)).segment >= 0;
+          const double edge = search.rootMeanSquareEdge(), diagonal = search.longestDiagonal();
+          std::vector<Vec3> places;  // as bindSlaves does it
+          for (int s : wanted) places.push_back(scene.nodes.position[s]);
+          for (int k : localOrder(places)) {
+            const Vec3& x = places[k];
+            found += (method == SearchMethod::box ? search.box(x, edge) : search.nearestNode(x, diagonal)).segment >= 0;
           }
         },
         2);

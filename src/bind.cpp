@@ -1,5 +1,8 @@
 #include "bind.hpp"
 
+#include <algorithm>
+
+#include "ordering.hpp"
 #include "scene_view.hpp"
 #include "search.hpp"
 
@@ -13,6 +16,11 @@ class Binder : SceneView {
   std::vector<Bond> run() {
     claimSlaves();
     for (int t = 0; t < static_cast<int>(scene.ties.size()); ++t) bindTie(t);
+    if (bonds.empty() && !model.dropped.empty()) {
+      const Dropped& first = model.dropped.front();
+      throw SceneError(tie(first.tie) + "all its slaves are dropped (slave " + std::to_string(first.id) + ": " +
+                       first.reason + "), which leaves nothing to model: an FMU without variables is of no use");
+    }
     return std::move(bonds);
   }
 
@@ -22,6 +30,7 @@ class Binder : SceneView {
   std::vector<int> tieOf;  // per scene node: the tie it is a slave of, or -1
 
   void warn(std::string line) { model.findings.push_back({Finding::warning, std::move(line)}); }
+  void note(std::string line) { model.findings.push_back({Finding::note, std::move(line)}); }
 
   // No slave in two ties, none that is also a master.
   void claimSlaves() {
@@ -45,60 +54,124 @@ class Binder : SceneView {
 
   void bindTie(int t) {
     const SceneTie& spec = scene.ties[t];
+    const int count = static_cast<int>(spec.slaves.size());
     std::vector<std::array<int, 4>> nodes;
     std::vector<std::int64_t> ids;
     for (int e : spec.segments) {
+      refuseRepeated(t, e);
       nodes.push_back(scene.segments.nodes[e]);
       ids.push_back(scene.segments.id[e]);
     }
     const SegmentSearch search(scene.nodes.position, std::move(nodes), std::move(ids));
-    std::string passedOver;
-    for (int k : search.zeroArea()) {
+    for (int k : search.zeroArea())
       warn(tie(t) + "segment " + segmentId(spec.segments[k]) +
            ": has no area (its nodes coincide, are collinear or fold onto each other); passed over");
-      passedOver += (passedOver.empty() ? "" : ", ") + segmentId(spec.segments[k]);
+    const bool box = spec.search == SearchMethod::box;
+    const double byDefault = box ? search.rootMeanSquareEdge() : search.longestDiagonal();
+    const double reach = spec.searchDistance > 0 ? spec.searchDistance : byDefault;
+    model.searchDistance.push_back(reach);
+
+    // Along a curve, so that what one slave reads is still at hand for the next; told in the order of the tie.
+    std::vector<Vec3> places;
+    places.reserve(count);
+    for (int s : spec.slaves) places.push_back(scene.nodes.position[s]);
+    std::vector<Bond> found(count);
+    std::vector<std::pair<int, Match>> toTell;
+    for (int k : localOrder(places)) {
+      Match match = box ? search.box(places[k], reach) : search.nearestNode(places[k], reach);
+      const int e = match.segment < 0 ? -1 : spec.segments[match.segment];
+      if (e < 0 || match.rival >= 0 || match.folded >= 0 || match.projection.outside > SegmentSearch::warnOutside)
+        toTell.emplace_back(k, match);
+      if (e >= 0) withoutNoise(e, places[k], match.projection);
+      found[k] = {spec.slaves[k],         t, e, e < 0 ? 0 : corners(e), Coupling::translation, match.projection,
+                  match.projection.offset};
     }
-    const double distance = spec.searchDistance > 0 ? spec.searchDistance : search.defaultDistance();
-    model.searchDistance.push_back(distance);
-    for (int s : spec.slaves) {
-      const Vec3& x = scene.nodes.position[s];
-      const Match match = spec.search == SearchMethod::box ? search.box(x, distance) : search.nearestNode(x, distance);
-      if (match.segment < 0) {
-        unresolved(t, s, match, distance, search, passedOver);
-        continue;
-      }
-      const int e = spec.segments[match.segment];
-      const std::string where = tie(t) + "slave " + id(s) + ": ";
-      if (match.projection.outside > SegmentSearch::warnOutside)
-        warn(where + "lies outside segment " + segmentId(e) + " (xi = " + text(match.projection.xi) +
-             ", eta = " + text(match.projection.eta) + "); its inertia uses the projection clamped to the segment");
-      if (match.unconverged >= 0)
-        warn(where + "the projection on segment " + segmentId(spec.segments[match.unconverged]) +
-             " did not converge; the segment was passed over");
-      bonds.push_back({s, t, e, corners(e), Coupling::translation, match.projection, x - match.projection.point});
+    std::sort(toTell.begin(), toTell.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+    std::vector<int> used;
+    for (const auto& [k, match] : toTell) {
+      if (match.segment < 0)
+        unresolved(t, spec.slaves[k], match, reach, search);
+      else
+        tell(t, spec.slaves[k], match);
+      if (match.crossing >= 0) used.push_back(match.crossing);
     }
+    for (int k : search.crossing())
+      if (std::find(used.begin(), used.end(), k) == used.end())
+        note(tie(t) + "segment " + segmentId(spec.segments[k]) + ": crosses itself (its nodes are not in order round " +
+             "it); no slave would use it");
+    std::erase_if(found, [](const Bond& b) { return b.segment < 0; });
+    if (bonds.empty())
+      bonds = std::move(found);
+    else
+      bonds.insert(bonds.end(), found.begin(), found.end());
   }
 
-  void unresolved(int t, int s, const Match& match, double distance, const SegmentSearch& search,
-                  const std::string& passedOver) {
-    const bool box = scene.ties[t].search == SearchMethod::box;
-    // Far away: how far tells the user what to change.
-    const Match far = search.box(scene.nodes.position[s], 1e6 * distance);
-    std::string line = tie(t) + "slave " + id(s) + ": no segment found ";
-    line += box ? "within search_distance " + text(distance) + " m"
-                : "at its nearest master node in the box of side search_distance " + text(distance) + " m";
-    if (far.segment >= 0)
-      line += "; the nearest is segment " + segmentId(scene.ties[t].segments[far.segment]) + " at " +
-              text(far.distance) + " m";
-    else
-      line += "; it lies outside every segment by more than half its size";
-    if (!passedOver.empty()) line += "; without area and passed over: segment " + passedOver;
-    if (match.unconverged >= 0)
+  void refuseRepeated(int t, int e) {
+    const auto& nodes = scene.segments.nodes[e];
+    for (int i = 0; i < corners(e); ++i)
+      for (int j = 0; j < i; ++j)
+        if (nodes[i] == nodes[j])
+          throw SceneError(tie(t) + "segment " + segmentId(e) + ": repeats node " + id(nodes[i]) +
+                           "; only the third and fourth node of a triangle may be the same");
+  }
+
+  // An offset that rounding alone can make counts as none: it would give rotations an inertia of next to nothing.
+  void withoutNoise(int e, const Vec3& slave, Projection& p) const {
+    Vec3 x[5];
+    const int n = gather(e, x);
+    x[n] = slave;
+    double size = 0;
+    for (int i = 1; i < n; ++i) size = std::max(size, (x[i] - x[0]).norm());
+    if (p.distance > std::max(1e-12 * size, coordinateNoise(n + 1, x))) return;
+    p.offset.setZero();
+    p.distance = 0;
+  }
+
+  void tell(int t, int s, const Match& match) {
+    const auto name = [&](int k) { return "segment " + segmentId(scene.ties[t].segments[k]); };
+    const std::string where = tie(t) + "slave " + id(s) + ": ";
+    const Projection& p = match.projection;
+    if (p.outside > SegmentSearch::warnOutside)
+      warn(where + "lies outside " + name(match.segment) + " (xi = " + text(p.xi) + ", eta = " + text(p.eta) + ")" +
+           (scene.ties[t].formulation == Formulation::standard
+                ? "; its inertia uses the projection clamped to the segment"
+                : ""));
+    if (match.folded >= 0)
+      warn(where + name(match.folded) + " is nearer, but folds onto itself there (one of its corners points inward); " +
+           "passed over");
+    if (match.rival >= 0)
+      warn(where + "is as near to " + name(match.rival) + " as to " + name(match.segment) + ", which it is tied to (" +
+           length(p.nearest) + ")");
+  }
+
+  void unresolved(int t, int s, const Match& match, double reach, const SegmentSearch& search) {
+    const SceneTie& spec = scene.ties[t];
+    const auto name = [&](int k) { return "segment " + segmentId(spec.segments[k]); };
+    const std::string where = tie(t) + "slave " + id(s) + ": ";
+    std::string line = "no segment found ";
+    line += spec.search == SearchMethod::box ? "within" : "at its nearest master node within";
+    line += " search_distance " + length(reach);
+    // Why the nearest one is none tells the user what to change.
+    const Match near = search.nearest(scene.nodes.position[s]);
+    if (match.crossing >= 0) {
       line +=
-          "; the projection on segment " + segmentId(scene.ties[t].segments[match.unconverged]) + " did not converge";
-    if (!scene.ties[t].dropUnresolved) throw SceneError(line);
-    warn(line + "; dropped");
-    model.dropped.push_back({scene.nodes.id[s], t, line.substr(line.find("no segment"))});
+          "; the nearest is " + name(match.crossing) + ", which crosses itself (its nodes are not in order round it)";
+    } else if (near.segment >= 0) {
+      const Projection& p = near.projection;
+      line += "; the nearest is " + name(near.segment) + " at " + length(p.nearest);
+      if (near.crossing >= 0)
+        line += ", which crosses itself (its nodes are not in order round it)";
+      else if (p.folded)
+        line += ", which folds onto itself there (one of its corners points inward)";
+      else if (!(p.outside <= SegmentSearch::maxOutside))
+        line += ", but the slave lies beyond its edge by more than a quarter of its size (|xi| or |eta| above 1.5)";
+    }
+    std::string passedOver;
+    for (int k : search.zeroArea()) passedOver += (passedOver.empty() ? "" : ", ") + segmentId(spec.segments[k]);
+    if (!passedOver.empty()) line += "; without area and passed over: segment " + passedOver;
+    if (!spec.dropUnresolved) throw SceneError(where + line);
+    warn(where + line + "; dropped");
+    model.dropped.push_back({scene.nodes.id[s], t, line});
   }
 };
 

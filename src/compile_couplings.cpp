@@ -1,4 +1,6 @@
 // Which kinematics ties each slave, and which rotational freedoms the model keeps.
+#include <algorithm>
+
 #include "compilation.hpp"
 
 namespace tiefmu {
@@ -7,6 +9,38 @@ namespace {
 
 constexpr double conditionWarned = 1e6;    // of Ibar
 constexpr double offsetNegligible = 1e-9;  // of the segment's size
+constexpr double addedMassWarned = 0.1;    // of the masters' own
+
+// What the lumped inertia of a mean-motion tie adds to its free masters beyond the slaves' own mass (theory 4):
+// (J + m d^2) lambda on each.
+struct AddedMass {
+  double sum = 0, largest = 0;  // kg
+  const Bond* bond = nullptr;   // of the largest
+  std::vector<int> masters;     // free ones, repeated
+
+  void add(const Scene& scene, const Bond& b, double lambda) {
+    const double each = (scene.nodes.inertia[b.slave] + scene.nodes.mass[b.slave] * b.offset.squaredNorm()) * lambda;
+    double all = 0;
+    for (int i = 0; i < b.corners; ++i) {
+      const int node = scene.segments.nodes[b.segment][i];
+      if (scene.nodes.motion[node] != Motion::free) continue;
+      masters.push_back(node);
+      all += each;
+    }
+    sum += all;
+    if (all > largest) {
+      largest = all;
+      bond = &b;
+    }
+  }
+  double ownMass(const Scene& scene) {
+    std::sort(masters.begin(), masters.end());
+    masters.erase(std::unique(masters.begin(), masters.end()), masters.end());
+    double mass = 0;
+    for (int node : masters) mass += scene.nodes.mass[node];
+    return mass;
+  }
+};
 
 }  // namespace
 
@@ -19,6 +53,7 @@ void Compilation::chooseCouplings() {
     const Bond* bond = nullptr;
   };
   std::vector<StillOffsets> stillOffsets(scene.ties.size());
+  std::vector<AddedMass> added(scene.ties.size());
   std::vector<std::uint8_t> toldCondition(scene.segments.id.size(), 0), toldRotations = toldCondition;
   for (Bond& b : bonds) {
     bound[b.slave] = 1;
@@ -43,6 +78,7 @@ void Compilation::chooseCouplings() {
         toldCondition[b.segment] = 1;
         warn(onSegment + "its nodes are nearly collinear: cond(Ibar) = " + text(inertia.condition));
       }
+      added[b.tie].add(scene, b, inertia.lambda);
       continue;
     }
     b.coupling = still.empty() ? Coupling::rotation : Coupling::translation;
@@ -65,10 +101,20 @@ void Compilation::chooseCouplings() {
   }
   for (const StillOffsets& s : stillOffsets)
     if (s.count > 0)
-      warn(tie(s.bond->tie) + "slave " + id(s.bond->slave) + ": offset d = " + text(s.largest) + " m from segment " +
+      warn(tie(s.bond->tie) + "slave " + id(s.bond->slave) + ": offset d = " + length(s.largest) + " from segment " +
            segmentId(s.bond->segment) + ", whose nodes have no rotations" +
            (s.count > 1 ? " (the largest of " + std::to_string(s.count) + " such slaves)" : "") +
            ": the offset never turns and the moment d x F is lost; formulation = \"optimized\" carries both");
+  if (scene.settings.inertia != Inertia::lumped) return;
+  for (AddedMass& a : added) {
+    const double own = a.ownMass(scene);
+    if (!a.bond || !(a.sum > addedMassWarned * own)) continue;
+    const Bond& b = *a.bond;
+    warn(tie(b.tie) + "adds " + mass(a.sum) + " to free masters of " + mass(own) + ", most of it from slave " +
+         id(b.slave) + " of " + mass(scene.nodes.mass[b.slave]) + " at an offset of " + length(b.offset.norm()) +
+         " from the centre of segment " + segmentId(b.segment) + " (" + mass(a.largest) +
+         "); inertia = \"consistent\" adds none, a nearer or larger segment less");
+  }
 }
 
 // The rotational freedoms that the model keeps: those of free nodes that nothing turns and nothing resists are left

@@ -66,8 +66,8 @@ void Compilation::placeSprings() {
           orient(spring.b);
         else if (!fixedNode(spring.b))
           warn(where + (bound[spec.b] ? "slave " : "node ") + id(spec.b) +
-               " cannot turn: the moment of the shear force over the distance " + text(spring.length) +
-               " m is not balanced");
+               " cannot turn: the moment of the shear force over the distance " + length(spring.length) +
+               " is not balanced");
       }
     }
     model.springs.push_back(spring);

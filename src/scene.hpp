@@ -46,7 +46,7 @@ struct SceneTie {
   std::vector<int> slaves;
   Formulation formulation = Formulation::standard;
   SearchMethod search = SearchMethod::box;
-  double searchDistance = 0;  // m; 0: root mean square of the master edges
+  double searchDistance = 0;  // m; 0: root mean square of the master edges (box), longest diagonal (nearestNode)
   bool dropUnresolved = false;
 };
 
@@ -84,6 +84,12 @@ struct Settings {
   std::vector<std::string> expose, hide;  // names of INTERFACE's last two tables
 };
 
+// A unit of the scene's own, for messages; everything here is in SI.
+struct Unit {
+  std::string name;
+  double si = 1;  // what one of it is in SI
+};
+
 struct Scene {
   SceneNodes nodes;
   SceneSegments segments;
@@ -91,6 +97,7 @@ struct Scene {
   std::vector<SceneSpring> springs;
   std::vector<ScenePort> ports;
   Settings settings;
+  Unit length{"m", 1}, mass{"kg", 1};
 };
 
 // A scene that cannot be modelled. `what()` is one line that starts with the table it speaks of,

@@ -20,6 +20,9 @@ struct SceneView {
 
   std::string id(int node) const { return std::to_string(scene.nodes.id[node]); }
   std::string segmentId(int e) const { return std::to_string(scene.segments.id[e]); }
+  // In the scene's own units.
+  std::string length(double metres) const { return text(metres / scene.length.si) + " " + scene.length.name; }
+  std::string mass(double kilograms) const { return text(kilograms / scene.mass.si) + " " + scene.mass.name; }
   std::string tie(int t) const { return "tie '" + scene.ties[t].name + "': "; }
   int corners(int e) const { return scene.segments.nodes[e][3] < 0 ? 3 : 4; }
   // Positions of the corners of segment e (m) to x; returns how many.

@@ -62,7 +62,8 @@ class Problem:
             index = {n: k for k, n in enumerate(ids)}
             position = np.array([where[n] for n in ids])
             segments = [tuple(index[n] for n in segment_nodes[e]) for e in segment_ids]
-            reach = tie.get("search_distance", 0) or default_search_distance(position, segments)
+            method = tie.get("search", "box")
+            reach = tie.get("search_distance", 0) or default_search_distance(position, segments, method)
             points = np.array([where[i] for i in tie["slaves"]])
             winners = find(position, segments, segment_ids, points, tie.get("search", "box"), reach)
             for i, (e, p) in zip(tie["slaves"], winners):

@@ -168,41 +168,52 @@ def no_area(corners):
     return np.linalg.norm(np.cross(a, b)) < 1e-12 * np.max(np.sum(edges**2, axis=1))
 
 
-def default_search_distance(position, segments):
-    """Root mean square of the segments' edges."""
-    edges = [position[np.array(s)] - position[np.roll(s, 1)] for s in segments]
+def default_search_distance(position, segments, method="box"):
+    """Root mean square of the segments' edges; for nearest-node the longest diagonal (edge of a triangle)."""
+    corners = [position[np.array(s)] for s in segments]
+    if method == "nearest-node":
+        return max(np.linalg.norm(a - b) for x in corners for a in x for b in x)
+    edges = [x - np.roll(x, 1, axis=0) for x in corners]
     return np.sqrt(np.mean(np.sum(np.vstack(edges) ** 2, axis=1)))
+
+
+def edge_distance(corners, points):
+    """(m,): distances of points (m, 3) to the nearest edge of one segment."""
+    result = np.full(len(points), np.inf)
+    for a, b in zip(corners, np.roll(corners, -1, axis=0)):
+        t = np.clip((points - a) @ (b - a) / ((b - a) @ (b - a)), 0, 1)
+        result = np.minimum(result, np.linalg.norm(points - a - t[:, None] * (b - a), axis=1))
+    return result
 
 
 def find(position, segments, ids, points, method, reach, tie=1e-9):
     """Per point: (index of the winning segment, its projection), or (None, None). segments: node index tuples."""
     usable = [e for e in range(len(segments)) if not no_area(position[list(segments[e])])]
     local = np.full((len(points), len(segments), 2), np.nan)
-    outside, distance, nearest = (np.full((len(points), len(segments)), np.inf) for _ in range(3))
+    outside, distance = (np.full((len(points), len(segments)), np.inf) for _ in range(2))
     for e in usable:
         corners = position[list(segments[e])]
         local[:, e] = local_coordinates(np.broadcast_to(corners, (len(points), *corners.shape)), points)
         phi = shape(len(corners), *local[:, e].T)
-        distance[:, e] = np.linalg.norm(phi.T @ corners - points, axis=1)
-        nearest[:, e] = np.linalg.norm(corners - points[:, None], axis=2).min(axis=1)
         outside[:, e] = np.max(1 - 2 * phi, axis=0) if len(corners) == 3 else np.abs(local[:, e]).max(axis=1)
+        # to the closest point of the segment: its projection, or on an edge
+        orthogonal = np.linalg.norm(phi.T @ corners - points, axis=1)
+        distance[:, e] = np.where(outside[:, e] <= 1, orthogonal, edge_distance(corners, points))
+    distance[outside > 1.5] = np.inf  # no candidate: a slave that far outside is not found there
     answer, slack, nodes = [], tie * reach, {n for e in usable for n in segments[e]}
     for k, s in enumerate(points):
+        rated = usable
         if method == "nearest-node":
             gap = np.linalg.norm(position - s, axis=1)
-            gap[np.any(np.abs(position - s) > reach / 2, axis=1)] = np.inf
             gap[[n not in nodes for n in range(len(position))]] = np.inf
-            held = set(np.flatnonzero(gap <= gap.min() + slack)) if gap.min() < np.inf else set()
+            held = set(np.flatnonzero(gap <= gap.min() + slack)) if gap.min() <= reach else set()
             rated = [e for e in usable if held & set(segments[e])]
-        else:
-            rank = np.where(outside[k] <= 1 + tie, distance[k], nearest[k])
-            rank[outside[k] > 1.5] = np.inf  # no candidate: a slave that far outside is not found there
-            best = rank.min()
-            rated = [e for e in usable if best <= reach and rank[e] <= best + slack]
-        least = min((outside[k, e] for e in rated), default=np.inf)
-        if least > 1.5:
+        best = min((distance[k, e] for e in rated), default=np.inf)
+        if best > (reach if method == "box" else 1e300):
             answer.append((None, None))
             continue
+        rated = [e for e in rated if distance[k, e] <= best + slack]
+        least = min(outside[k, e] for e in rated)
         e = min((e for e in rated if outside[k, e] <= least + tie), key=lambda e: ids[e])
         answer.append((e, Projection(position[list(segments[e])], *local[k, e], s)))
     return answer

@@ -7,7 +7,9 @@ import tiefmu
 from scene_lines import NOT_FOUND, line_of
 
 QUAD = [[1, 0, 0, 0], [2, 0.1, 0, 0], [3, 0.1, 0.1, 0], [4, 0, 0.1, 0], [101, 0.03, 0.06, 0.04]]
-NO_AREA = "it lies outside every segment by more than half its size; without area and passed over: segment 1"
+NO_AREA = "without area and passed over: segment 1"
+CROSSES = "the nearest is segment 1, which crosses itself (its nodes are not in order round it)"
+BEYOND = "but the slave lies beyond its edge by more than a quarter of its size (|xi| or |eta| above 1.5)"
 NEEDLE = QUAD[:2] + [[3, 0.1, 1e-9, 0], [4, 0, 1e-9, 0], [101, 0.03, 0, 0.04]]
 
 # name: (nodes, segments, keys of the tie, line)
@@ -16,14 +18,14 @@ MESHES = {
         QUAD,
         [[1, 1, 3, 2, 4]],
         {},
-        f"tie 'weld': slave 101: no segment found within search_distance 0.122474 m; {NO_AREA}",
+        f"tie 'weld': slave 101: no segment found within search_distance 0.122474 m; {CROSSES}",
     ),
     "bow-tie, nearest node": (
         QUAD,
         [[1, 1, 2, 4, 3]],
         {"search": "nearest-node"},
-        "tie 'weld': slave 101: no segment found at its nearest master node in the box of side "
-        f"search_distance 0.122474 m; {NO_AREA}",
+        "tie 'weld': slave 101: no segment found at its nearest master node within "
+        f"search_distance 0.141421 m; {CROSSES}",
     ),
     "folded quad": (
         QUAD[:2] + [[3, 0.1, 0, 0], [4, 0, 0, 0]] + QUAD[4:],
@@ -51,19 +53,19 @@ MESHES = {
         "(cond(Ibar) = 5.76461e+15, at most 1e12), which leaves the rotation about "
         "them open",
     ),
-    "needle out of the box": (
+    "needle out of reach": (
         NEEDLE,
         [[1, 1, 2, 3, 4]],
-        {"search": "nearest-node"},
-        "tie 'weld': slave 101: no segment found at its nearest master node in the box of side "
-        "search_distance 0.0707107 m; the nearest is segment 1 at 0.04 m",
+        {"search": "nearest-node", "search_distance": 0.049},
+        "tie 'weld': slave 101: no segment found at its nearest master node within "
+        "search_distance 0.049 m; the nearest is segment 1 at 0.04 m",
     ),
     "slaves beside the masters": (
         QUAD[:4] + [[101, 10, 10, 0]],
         [[1, 1, 2, 3, 4]],
         {},
-        "tie 'weld': slave 101: no segment found within search_distance 0.1 m; it lies "
-        "outside every segment by more than half its size",
+        "tie 'weld': slave 101: no segment found within search_distance 0.1 m; the nearest is segment 1 at 14.0007 m, "
+        f"{BEYOND}",
     ),
     "slaves far above the masters": (
         QUAD[:4] + [[101, 0.05, 0.05, 10]],
@@ -128,7 +130,8 @@ def test_the_sense_of_a_segment_is_free(segments, weld):
 
 
 def test_segments_without_area_are_named_where_others_hold_the_slaves(weld):
-    weld["mesh"]["segments"].append([2, 1, 3, 2, 4])
+    weld["mesh"]["nodes"].append([5, 0.05, 0, 0])
+    weld["mesh"]["segments"].append([2, 1, 5, 2])
     assert (
         "tie 'weld': segment 2: has no area (its nodes coincide, are collinear or fold onto each other); passed over"
         in tiefmu.report(tiefmu.load(weld))["warnings"]

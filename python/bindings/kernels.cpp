@@ -92,8 +92,8 @@ void bindKernels(nb::module_& parent) {
         Vec3 x[4];
         const int n = cornersOf(corners, x);
         const std::size_t count = points.size() / 3;
-        std::vector<double> local, phi, clamp, distance, outside;
-        std::vector<std::uint8_t> converged;
+        std::vector<double> local, phi, clamp, distance, outside, nearest;
+        std::vector<std::uint8_t> converged, folded;
         for (std::size_t s = 0; s < count; ++s) {
           const Projection p = project(n, x, at(points.data(), static_cast<Eigen::Index>(s)));
           const Phi inside = clamped(n, p.phi.data());
@@ -102,7 +102,9 @@ void bindKernels(nb::module_& parent) {
           clamp.insert(clamp.end(), inside.begin(), inside.begin() + n);
           distance.push_back(p.distance);
           outside.push_back(p.outside);
+          nearest.push_back(p.nearest);
           converged.push_back(p.converged);
+          folded.push_back(p.folded);
         }
         nb::dict d;
         d["local"] = array(std::move(local), {count, 2});
@@ -110,12 +112,15 @@ void bindKernels(nb::module_& parent) {
         d["clamped"] = array(std::move(clamp), {count, static_cast<std::size_t>(n)});
         d["distance"] = array(std::move(distance), {count});
         d["outside"] = array(std::move(outside), {count});
+        d["nearest"] = array(std::move(nearest), {count});
         d["converged"] = plain(std::move(converged));
+        d["folded"] = plain(std::move(folded));
         return d;
       },
       "corners"_a, "points"_a,
       "Closest points of a segment (corners (n, 3), m) to points (m, 3): local (m, 2), phi and clamped (m, n), "
-      "distance (m,), outside (m,), converged (m,).");
+      "distance (m,) to the projection, outside (m,), nearest (m,): distance to the closest point of the segment, "
+      "converged (m,): a projection within 1.5 is known, folded (m,): the surface passes the place twice.");
 
   m.def(
       "node_inertia",
@@ -148,15 +153,17 @@ void bindKernels(nb::module_& parent) {
               throw nb::value_error("node index out of range");
           ids.push_back(static_cast<std::int64_t>(e) + 1);
         }
-        const SegmentSearch search(std::move(x), std::move(nodes), std::move(ids));
-        if (!(distance > 0)) distance = search.defaultDistance();
-        std::vector<int> segment;
+        const SegmentSearch search(x, std::move(nodes), std::move(ids));
+        const bool box = method == "box";
+        if (!(distance > 0)) distance = box ? search.rootMeanSquareEdge() : search.longestDiagonal();
+        std::vector<int> segment, rival;
         std::vector<double> gap, local;
         for (std::size_t s = 0; s < slaves.size() / 3; ++s) {
           const Vec3 p = at(slaves.data(), static_cast<Eigen::Index>(s));
-          const Match match = method == "box" ? search.box(p, distance) : search.nearestNode(p, distance);
+          const Match match = box ? search.box(p, distance) : search.nearestNode(p, distance);
           segment.push_back(match.segment);
-          gap.push_back(match.distance);
+          rival.push_back(match.rival);
+          gap.push_back(match.projection.nearest);
           local.insert(local.end(), {match.projection.xi, match.projection.eta});
         }
         nb::dict d;
@@ -165,13 +172,17 @@ void bindKernels(nb::module_& parent) {
         d["distance"] = array(std::move(gap), {count});
         d["local"] = array(std::move(local), {count, 2});
         d["search_distance"] = distance;
+        d["rival"] = plain(std::move(rival));
+        d["crossing"] = plain(std::vector<int>(search.crossing()));
         d["zero_area"] = plain(std::vector<int>(search.zeroArea()));
         return d;
       },
       "positions"_a, "segments"_a, "slaves"_a, "method"_a = "box", "distance"_a = 0.0,
-      "Segment index (-1: none), competing distance (m) and local coordinates per slave. segments: (m, 4) node "
-      "indices, "
-      "-1 as the fourth of a triangle; ids are index + 1. method 'box' or 'nearest-node'.");
+      "Segment index (-1: none), distance to it (m), local coordinates and rival (a segment as near on another side, "
+      "or "
+      "-1) per slave. segments: (m, 4) node indices, -1 as the fourth of a triangle; ids are index + 1. method 'box' "
+      "or "
+      "'nearest-node'.");
 
   nb::class_<Group>(m, "Group", "Slaves tied to segments of one shape by one coupling, outside any scene.")
       .def(

@@ -453,6 +453,14 @@ NB_MODULE(_core, m) {
       .def("add_port", &addPort, "name"_a, "nodes"_a, "listed"_a, "at"_a,
            "nodes: int32 indices; listed: by ids, so that each must be part of the model; at: [x, y, z], or empty for "
            "the mean of the nodes' positions.")
+      .def(
+          "set_units",
+          [](Scene& scene, const std::string& length, double metres, const std::string& mass, double kilograms) {
+            scene.length = {length, metres};
+            scene.mass = {mass, kilograms};
+          },
+          "length"_a, "metres"_a, "mass"_a, "kilograms"_a,
+          "Names of the units in which messages give lengths and masses, and how many m and kg they are.")
       .def("set_settings", &setSettings, nb::kw_only(), "inertia"_a = "lumped", "reaction"_a = "loads",
            "geometry"_a = "finite", "position"_a = "integrated", "gravity"_a = std::array<double, 3>{},
            "method"_a = "central-difference", "time_step"_a = 0.0, "safety"_a = 0.9, "threads"_a = 0,

@@ -17,7 +17,7 @@ from .mesh import properties
 from .mesh.data import listed
 from .mesh.properties import MOTIONS
 from .mesh.properties import NUMBERS as NODE_VALUES
-from .units import Units
+from .units import LENGTHS, MASSES, Units
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -273,6 +273,8 @@ class Assembly:
     def scene(self) -> _core.Scene:
         """What the solver compiles."""
         scene, si = _core.Scene(), self.units.si
+        length, mass = self.units.length, self.units.mass
+        scene.set_units(length, float(LENGTHS[length]), mass, float(MASSES[mass]))
         scene.set_nodes(
             self.mesh.node_id,
             self.position,

@@ -44,6 +44,7 @@ class Units:
     """The units of one scene file, by their names in LENGTHS, MASSES and TIMES."""
 
     def __init__(self, length: str = "m", mass: str = "kg", time: str = "s"):
+        self.length, self.mass = length, mass  # names, for messages
         self._base = LENGTHS[length], MASSES[mass], TIMES[time]
 
     @classmethod
