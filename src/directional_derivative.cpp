@@ -99,7 +99,6 @@ void Dynamics::directionalDerivative(double* derivative) {
       std::fill(c.t.begin(), c.t.end(), 0.0);
       mapMotion(group, range, shape, dx, c.t.data(), c.xs.data(), c.otherTurn.data());
     });
-    if (has(Field::slavePosition)) std::copy(c.xs.begin(), c.xs.end(), seed(Field::slavePosition));
   }
   if (!model.springs.empty()) {
     const double *vl = velocityFor(Field::lagged), *wl = spinFor(Field::lagged);
@@ -177,61 +176,85 @@ void Dynamics::directionalDerivative(double* derivative) {
     }
   }
 
-  // Outputs
-  double *vs = seed(Field::slaveVelocity), *ws = seed(Field::slaveSpin);
-  eachGroup([&](const TieGroup& group, SegmentRange range, TieGeometry shape, std::size_t) {
-    mapMotion(group, range, shape, du, dturn, vs, ws);
-    if (shapeChange) mapMotionDerivative(group, shape, shapeChange, v, vs, ws);
-  });
+  // T q'' + b into c.as, c.zs and reactions into c.f, c.t
   const bool full = model.settings.reaction != Reaction::loads, split = model.settings.reaction == Reaction::split;
   if ((full && consistent) || has(Field::slaveAcceleration)) {
     std::fill(c.as.begin(), c.as.end(), 0.0);
     std::fill(c.zs.begin(), c.zs.end(), 0.0);
     differentiateAccelerations(c, da, dz, a, v, w, du, dturn, shapeChange);
-    if (has(Field::slaveAcceleration)) std::copy(c.as.begin(), c.as.end(), seed(Field::slaveAcceleration));
-    if (full && consistent) {
-      slaveAccelerations(a, z, v, w);
-      inertialLoads();
-      inertial(c.as, c.zs);
-      spread(c.as.data(), c.zs.data(), as_.data(), zs_.data());
-    }
+  }
+  if (full && consistent) {
+    slaveAccelerations(a, z, v, w);
+    inertialLoads();
+    c.other = c.as;
+    c.otherTurn = c.zs;
+    inertial(c.other, c.otherTurn);
+    spread(c.other.data(), c.otherTurn.data(), as_.data(), zs_.data());
   }
   if (full && (!consistent || split)) {
     const double sign = split ? 1 : -1;
     for (int i = 0; i < model.nodes(); ++i) at(c.f.data(), i) += sign * field(Field::addedMass)[i] * at(da, i);
     for (int i = 0; i < model.rotating(); ++i) at(c.t.data(), i) += sign * field(Field::addedInertia)[i] * at(dz, i);
   }
-  std::copy(c.f.begin(), c.f.end(), seed(Field::reactionForce));
-  std::copy(c.t.begin(), c.t.end(), seed(Field::reactionMoment));
-  if (ports.anyDriven()) {
-    ports.gather(c.f.data(), c.t.data(), seed(Field::portReaction), seed(Field::portReactionMoment));
-    if (!model.springs.empty())
-      ports.gather(c.node.data(), c.nodeMoment.data(), seed(Field::portReaction), seed(Field::portReactionMoment));
-  }
-  if (ports.anyOfSlaves()) ports.mapMotion(vs, ws, seed(Field::portMeanVelocity), seed(Field::portMeanSpin));
-  if (has(Field::energy)) {
-    double kinetic = 0;
-    for (int s = 0; s < model.slaves(); ++s) kinetic += mass[s] * at(field(Field::slaveVelocity), s).dot(at(vs, s));
-    for (int s = 0; s < model.turning(); ++s) kinetic += inertia[s] * at(field(Field::slaveSpin), s).dot(at(ws, s));
-    double* e = seed(Field::energy);
-    e[Energy::kinetic] = kinetic;
-    e[Energy::strain] = strain;
-    e[Energy::dissipated] = e[Energy::external] = 0;  // sums over time
-    e[Energy::residual] = kinetic + strain;
-  }
-  if (has(Field::powerResidual)) {
-    double sum = 0;
-    const auto change = [&](int count, const double* p, const double* q, const double* dp, const double* dq) {
-      double part = 0;
-      for (int i = 0; i < count; ++i) part += at(dp, i).dot(at(q, i)) + at(p, i).dot(at(dq, i));
-      return part;
-    };
-    sum += change(model.slaves(), slaveLoad_, field(Field::slaveVelocity), c.load.data(), vs);
-    sum += change(model.turning(), slaveMoment_, field(Field::slaveSpin), c.moment.data(), ws);
-    sum -= change(model.nodes(), field(Field::reactionForce), v, c.f.data(), du);
-    sum -= change(model.rotating(), field(Field::reactionMoment), w, c.t.data(), dturn);
-    *seed(Field::powerResidual) = sum;
-  }
+
+  // Outputs in the order of their fields. Each has its branch: one without does not compile.
+  double *vs = seed(Field::slaveVelocity), *ws = seed(Field::slaveSpin);
+  forEachField([&](auto constant) {
+    constexpr Field f = constant;
+    if (!has(f)) return;
+    double* out = seed(f);
+    if constexpr (f == Field::slaveVelocity) {
+      eachGroup([&](const TieGroup& group, SegmentRange range, TieGeometry shape, std::size_t) {
+        mapMotion(group, range, shape, du, dturn, vs, ws);
+        if (shapeChange) mapMotionDerivative(group, shape, shapeChange, v, vs, ws);
+      });
+    } else if constexpr (f == Field::slaveSpin) {
+      // with the velocities
+    } else if constexpr (f == Field::reactionForce) {
+      std::copy(c.f.begin(), c.f.end(), out);
+    } else if constexpr (f == Field::reactionMoment) {
+      std::copy(c.t.begin(), c.t.end(), out);
+    } else if constexpr (f == Field::slavePosition) {
+      std::copy(c.xs.begin(), c.xs.end(), out);
+    } else if constexpr (f == Field::slaveAcceleration) {
+      std::copy(c.as.begin(), c.as.end(), out);
+    } else if constexpr (f == Field::portReaction) {
+      ports.gather(c.f.data(), c.t.data(), out, seed(Field::portReactionMoment));
+      if (!model.springs.empty())
+        ports.gather(c.node.data(), c.nodeMoment.data(), out, seed(Field::portReactionMoment));
+    } else if constexpr (f == Field::portReactionMoment) {
+      // with the forces
+    } else if constexpr (f == Field::portMeanVelocity) {
+      ports.mapMotion(vs, ws, out, seed(Field::portMeanSpin));
+    } else if constexpr (f == Field::portMeanSpin) {
+      // with the velocities
+    } else if constexpr (f == Field::energy) {
+      double kinetic = 0;
+      for (int s = 0; s < model.slaves(); ++s) kinetic += mass[s] * at(field(Field::slaveVelocity), s).dot(at(vs, s));
+      for (int s = 0; s < model.turning(); ++s) kinetic += inertia[s] * at(field(Field::slaveSpin), s).dot(at(ws, s));
+      out[Energy::kinetic] = kinetic;
+      out[Energy::strain] = strain;
+      out[Energy::dissipated] = out[Energy::external] = 0;  // sums over time
+      out[Energy::residual] = kinetic + strain;
+    } else if constexpr (f == Field::powerResidual) {
+      const auto change = [&](int count, const double* p, const double* q, const double* dp, const double* dq) {
+        double part = 0;
+        for (int i = 0; i < count; ++i) part += at(dp, i).dot(at(q, i)) + at(p, i).dot(at(dq, i));
+        return part;
+      };
+      *out = 0;
+      *out += change(model.slaves(), slaveLoad_, field(Field::slaveVelocity), c.load.data(), vs);
+      *out += change(model.turning(), slaveMoment_, field(Field::slaveSpin), c.moment.data(), ws);
+      *out -= change(model.nodes(), field(Field::reactionForce), v, c.f.data(), du);
+      *out -= change(model.rotating(), field(Field::reactionMoment), w, c.t.data(), dturn);
+    } else if constexpr (f == Field::portPosition || f == Field::drift) {
+      // states: `out` stays zero
+    } else if constexpr (f == Field::stableTimeStep || f == Field::nodalTimeStep) {
+      // these follow from states and parameters
+    } else {
+      static_assert(rowOf(f).role != Role::output, "state how this output changes with the inputs");
+    }
+  });
 }
 
 }  // namespace tiefmu

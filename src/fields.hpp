@@ -6,6 +6,8 @@
 #include <cstddef>
 #include <cstdint>
 #include <iterator>
+#include <type_traits>
+#include <utility>
 
 namespace tiefmu {
 
@@ -214,6 +216,13 @@ consteval bool fieldRowsAreComplete() {
 }  // namespace detail
 
 static_assert(detail::fieldRowsAreComplete(), "one row for each field, in the order of the enumeration");
+
+// body(std::integral_constant<Field, f>) for each field in order.
+template <class Body> constexpr void forEachField(Body body) {
+  [&]<std::size_t... i>(std::index_sequence<i...>) {
+    (body(std::integral_constant<Field, static_cast<Field>(i)>{}), ...);
+  }(std::make_index_sequence<fieldCount>{});
+}
 
 // Does `b` follow `a` in memory, so that both are one array?
 constexpr bool adjacent(Field a, Field b) { return indexOf(a) + 1 == indexOf(b); }
