@@ -18,21 +18,20 @@ std::size_t Instance::inputAt(std::uint32_t reference) const {
   return range.place + (reference - range.first);
 }
 
-void Instance::requireOutputs(const fmi2ValueReference refs[], std::size_t count) const {
+void Instance::requireOutputs(const std::uint32_t refs[], std::size_t count) const {
   forRuns(refs, count, [&](const Range& range, std::uint32_t first, std::size_t, std::size_t) {
     require(range, first, Causality::output);
   });
 }
 
-void Instance::takeScratch(const fmi2ValueReference refs[], std::size_t count, double values[]) const {
+void Instance::takeScratch(const std::uint32_t refs[], std::size_t count, double values[]) const {
   forRuns(refs, count, [&](const Range& range, std::uint32_t first, std::size_t run, std::size_t i) {
     std::copy_n(scratch.begin() + static_cast<std::ptrdiff_t>(range.place + (first - range.first)), run, values + i);
   });
 }
 
-void Instance::directionalDerivative(const fmi2ValueReference unknown[], std::size_t unknowns,
-                                     const fmi2ValueReference known[], std::size_t knowns, const double seed[],
-                                     double change[]) {
+void Instance::directionalDerivative(const std::uint32_t unknown[], std::size_t unknowns, const std::uint32_t known[],
+                                     std::size_t knowns, const double seed[], double change[]) {
   if (knowns > 0 && !known) throw Refused("the array of value references is a null pointer");
   if ((unknowns > 0 && !change) || (knowns > 0 && !seed)) throw Refused("an array of values is a null pointer");
   requireOutputs(unknown, unknowns);
@@ -46,7 +45,7 @@ void Instance::directionalDerivative(const fmi2ValueReference unknown[], std::si
   takeScratch(unknown, unknowns, change);
 }
 
-void Instance::setInputDerivatives(const fmi2ValueReference refs[], std::size_t count, const fmi2Integer orders[],
+void Instance::setInputDerivatives(const std::uint32_t refs[], std::size_t count, const int orders[],
                                    const double values[]) {
   if (count > 0 && !refs) throw Refused("the array of value references is a null pointer");
   if (count > 0 && (!orders || !values)) throw Refused("an array of orders or values is a null pointer");
@@ -60,8 +59,7 @@ void Instance::setInputDerivatives(const fmi2ValueReference refs[], std::size_t 
   for (std::size_t k = 0; k < count; ++k) simulation.setInputDerivative(inputAt(refs[k]), orders[k], values[k]);
 }
 
-void Instance::outputDerivatives(const fmi2ValueReference refs[], std::size_t count, const fmi2Integer orders[],
-                                 double values[]) {
+void Instance::outputDerivatives(const std::uint32_t refs[], std::size_t count, const int orders[], double values[]) {
   if (count > 0 && (!orders || !values)) throw Refused("an array of orders or values is a null pointer");
   requireOutputs(refs, count);
   for (std::size_t k = 0; k < count; ++k)

@@ -4,60 +4,10 @@
 #include <bit>
 #include <cmath>
 #include <cstring>
-#include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <limits>
-
-#include "../modelDescription/bytes.hpp"
-#include "../modelDescription/xml.hpp"
 
 namespace tiefmu {
 namespace {
-
-int hexDigit(char c) {
-  if (c >= '0' && c <= '9') return c - '0';
-  if (c >= 'a' && c <= 'f') return c - 'a' + 10;
-  if (c >= 'A' && c <= 'F') return c - 'A' + 10;
-  return -1;
-}
-
-std::string percentDecoded(const std::string& text) {
-  std::string out;
-  for (std::size_t i = 0; i < text.size(); ++i) {
-    const bool escape =
-        text[i] == '%' && i + 2 < text.size() && hexDigit(text[i + 1]) >= 0 && hexDigit(text[i + 2]) >= 0;
-    if (!escape) {
-      out += text[i];
-    } else {
-      out += static_cast<char>(16 * hexDigit(text[i + 1]) + hexDigit(text[i + 2]));
-      i += 2;
-    }
-  }
-  return out;
-}
-
-// file:/path, file:///path, file://localhost/path, or a plain path.
-std::string folderOf(const std::string& location) {
-  if (location.compare(0, 5, "file:") != 0) {
-    if (location.find("://") != std::string::npos)
-      throw ResourceError("resource location '" + location + "': only file: locations can be read");
-    return location;
-  }
-  std::string path = location.substr(5);
-  if (path.compare(0, 2, "//") == 0) {
-    const std::size_t slash = path.find('/', 2);
-    const std::string host = path.substr(2, slash == std::string::npos ? slash : slash - 2);
-    if (!host.empty() && host != "localhost")
-      throw ResourceError("resource location '" + location + "': on another computer, '" + host + "'");
-    path = slash == std::string::npos ? "" : path.substr(slash);
-  }
-  path = percentDecoded(path);
-#ifdef _WIN32
-  if (path.size() > 2 && path[0] == '/' && path[2] == ':') path.erase(0, 1);  // /C:/folder
-#endif
-  return path;
-}
 
 // Adding the lowest exponent bit to an exponent of ones, which infinities and NaN have, carries into the sign bit.
 bool allFinite(const double* values, std::size_t count) {
@@ -86,38 +36,8 @@ double tolerance(double time, double step) { return 1e-12 * std::abs(time) + 1e-
 
 }  // namespace
 
-std::string resourcePath(const std::string& location, const char* file) {
-  return (std::filesystem::path(folderOf(location)) / file).string();
-}
-
-Resource loadResource(const std::string& location, const std::string& guid) {
-  const std::string path = resourcePath(location, "scene.bin");
-  std::ifstream stream(path, std::ios::binary);
-  if (!stream) throw ResourceError("cannot read '" + path + "'");
-  const std::string bytes{std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
-  Resource resource;
-  try {
-    resource = readResource(bytes);
-  } catch (const ResourceError& e) {
-    throw ResourceError("'" + path + "': " + e.what());
-  }
-  if (resource.guid != guid)
-    throw ResourceError("'" + path + "' has GUID '" + printable(resource.guid) + "', the caller expects '" +
-                        printable(guid) + "'");
-  return resource;
-}
-
-bool Logger::wants(Category category) const { return callback && on && categories >> static_cast<int>(category) & 1; }
-
-void Logger::write(fmi2Status status, Category category, const char* message) const noexcept {
-  const bool urgent = status == fmi2Error || status == fmi2Fatal;
-  if (!callback || !(urgent || wants(category))) return;
-  // The callback takes a printf format; a message may hold any character.
-  callback(environment, instanceName.c_str(), status, logCategories[static_cast<int>(category)].name, "%s", message);
-}
-
-Instance::Instance(Logger instanceLogger, Resource resource)
-    : logger(std::move(instanceLogger)),
+Instance::Instance(std::unique_ptr<Log> instanceLog, Resource resource)
+    : log(std::move(instanceLog)),
       guid(std::move(resource.guid)),
       simulation(std::make_shared<const Model>(std::move(resource.model))) {
   for (const Block& b : variables(simulation.model(), simulation.layout())) {
@@ -136,20 +56,6 @@ Instance::Instance(Logger instanceLogger, Resource resource)
   }
 }
 
-void Instance::setDebugLogging(bool on, std::size_t count, const fmi2String categories[]) {
-  unsigned chosen = count == 0 ? ~0u : 0u;
-  for (std::size_t i = 0; i < count; ++i) {
-    const std::string name = categories && categories[i] ? categories[i] : "";
-    const auto* found = std::find_if(std::begin(logCategories), std::end(logCategories),
-                                     [&](const LogCategory& c) { return name == c.name; });
-    if (found == std::end(logCategories)) throw Refused("unknown log category '" + name + "'");
-    const auto category = static_cast<Category>(found - std::begin(logCategories));
-    chosen |= category == Category::all ? ~0u : 1u << static_cast<int>(category);
-  }
-  logger.on = on;
-  logger.categories = chosen;
-}
-
 void Instance::setupExperiment(double startTime, bool stopTimeDefined, double stopTime) {
   if (!std::isfinite(startTime)) throw Refused("the start time is not a finite number");
   if (stopTimeDefined && !(stopTime >= startTime)) throw Refused("the stop time is not after the start time");
@@ -157,22 +63,22 @@ void Instance::setupExperiment(double startTime, bool stopTimeDefined, double st
 }
 
 void Instance::enterInitializationMode() {
-  if (logger.wants(Category::tie))
+  if (log->wants(Category::tie))
     for (const Finding& f : simulation.model().findings)
-      logger.write(f.kind == Finding::warning ? fmi2Warning : fmi2OK, Category::tie, f.text.c_str());
-  state = initializationMode;
+      log->write(f.kind == Finding::warning ? Severity::warning : Severity::note, Category::tie, f.text.c_str());
+  state = State::initialization;
 }
 
 void Instance::exitInitializationMode() {
   simulation.initialise(clock.time);
-  if (simulation.model().anyFree() && logger.wants(Category::stability)) {
+  if (simulation.model().anyFree() && log->wants(Category::stability)) {
     const std::string message = "stable time step " + text(*simulation.field(Field::stableTimeStep)) +
                                 " s, nodal time step " + text(*simulation.field(Field::nodalTimeStep)) +
                                 " s, limit of the integrator " + text(simulation.integratorLimit()) + " s";
-    logger.write(fmi2OK, Category::stability, message.c_str());
+    log->write(Severity::note, Category::stability, message.c_str());
   }
   findHostStep();
-  state = stepComplete;
+  state = State::stepComplete;
 }
 
 // Theory (6.3) for what the host moves: it carries its declared mass and the lumped addition (theory 5), on the
@@ -210,14 +116,14 @@ void Instance::findHostStep() {
 }
 
 void Instance::warnOfStep(double step) {
-  if (warnedOfStep || !logger.wants(Category::stability)) return;
+  if (warnedOfStep || !log->wants(Category::stability)) return;
   warnedOfStep = true;
   const Model& model = simulation.model();
   const std::string whose = hostPort >= 0 ? "port '" + model.ports[static_cast<std::size_t>(hostPort)].name + "'"
                                           : "driven master node " + std::to_string(model.nodeId[hostNode]);
   const std::string message = "the communication step " + text(step) + " s is longer than the nodal time step " +
                               text(hostStep) + " s of " + whose + ": an explicit host is unstable with it";
-  logger.write(fmi2Warning, Category::stability, message.c_str());
+  log->write(Severity::warning, Category::stability, message.c_str());
 }
 
 void Instance::reset() {
@@ -225,7 +131,7 @@ void Instance::reset() {
   clock = {};
   hostStep = std::numeric_limits<double>::infinity();
   warnedOfStep = false;
-  state = instantiated;
+  state = State::instantiated;
 }
 
 const Instance::Range& Instance::rangeOf(std::uint32_t reference) const {
@@ -245,13 +151,13 @@ std::string Instance::nameOf(std::uint32_t reference) const {
   return {};
 }
 
-void Instance::get(const fmi2ValueReference refs[], std::size_t count, double values[]) {
+void Instance::get(const std::uint32_t refs[], std::size_t count, double values[]) {
   if (count > 0 && !values) throw Refused("the array of values is a null pointer");
   try {
     simulation.updateOutputs();
   } catch (const std::exception&) {
     forRuns(refs, count, [](const Range&, std::uint32_t, std::size_t, std::size_t) {});  // what is refused comes first
-    if (state != error) throw;  // there what still can be read is
+    if (state != State::error) throw;  // there what still can be read is
   }
   const double* data = simulation.data();
   forRuns(refs, count, [&](const Range& range, std::uint32_t first, std::size_t run, std::size_t i) {
@@ -274,7 +180,7 @@ void Instance::refuseValue(std::uint32_t first, const double* values) const {
                 (std::isnan(values[bad]) ? "NaN" : "an infinite value"));
 }
 
-void Instance::set(const fmi2ValueReference refs[], std::size_t count, const double values[]) {
+void Instance::set(const std::uint32_t refs[], std::size_t count, const double values[]) {
   if (count > 0 && !values) throw Refused("the array of values is a null pointer");
   bool parameters = false, inputs = false;
   double* data = simulation.data();
@@ -283,7 +189,7 @@ void Instance::set(const fmi2ValueReference refs[], std::size_t count, const dou
   forRuns(refs, count, [&](const Range& range, std::uint32_t first, std::size_t run, std::size_t i) {
     if (range.causality == Causality::input)
       inputs = true;
-    else if (range.causality == Causality::parameter && state != stepComplete)
+    else if (range.causality == Causality::parameter && state != State::stepComplete)
       parameters = true;
     else
       refuseToSet(range, first);

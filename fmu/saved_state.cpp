@@ -100,8 +100,14 @@ void check(const SavedState& s, std::size_t numbers) {
     if (!condition) throw StateError("the state contradicts itself");
   };
   require(s.simulation.data.size() == numbers);
-  require(s.state == instantiated || s.state == initializationMode || s.state == stepComplete ||
-          s.state == terminated || s.state == error);
+  switch (s.state) {
+    case State::instantiated:
+    case State::initialization:
+    case State::stepComplete:
+    case State::terminated:
+    case State::error: break;
+    default: require(false);
+  }
   require(std::isfinite(s.clock.time) && std::isfinite(s.simulation.time) && !std::isnan(s.clock.stop));
   require(s.simulation.substeps >= 0);
   for (const InputDerivatives& d : s.simulation.inputs) require(std::isfinite(d.first) && std::isfinite(d.second));

@@ -5,7 +5,7 @@
 #include <string_view>
 
 #include "../src/simulation.hpp"
-#include "calls.hpp"
+#include "state.hpp"
 
 namespace tiefmu {
 
@@ -16,7 +16,7 @@ struct Clock {
 
 struct SavedState {
   Simulation::State simulation;
-  State state = instantiated;
+  State state = State::instantiated;
   Clock clock;
 };
 

@@ -3,19 +3,19 @@
 
 namespace tiefmu {
 
-SavedState& Instance::known(fmi2FMUstate saved) const {
+SavedState& Instance::known(void* saved) const {
   const auto found = savedStates.find(saved);
   if (found == savedStates.end()) throw Refused("this is no state that the instance has saved");
   return *found->second;
 }
 
-void Instance::keep(fmi2FMUstate* saved, std::unique_ptr<SavedState> fresh) {
-  const fmi2FMUstate handle = fresh.get();
+void Instance::keep(void** saved, std::unique_ptr<SavedState> fresh) {
+  void* const handle = fresh.get();
   savedStates.emplace(handle, std::move(fresh));
   *saved = handle;
 }
 
-void Instance::getState(fmi2FMUstate* saved) {
+void Instance::getState(void** saved) {
   if (!saved) throw Refused("the place for the state is a null pointer");
   if (!*saved) keep(saved, std::make_unique<SavedState>());
   SavedState& s = known(*saved);
@@ -24,7 +24,7 @@ void Instance::getState(fmi2FMUstate* saved) {
   s.clock = clock;
 }
 
-void Instance::setState(fmi2FMUstate saved) {
+void Instance::setState(void* saved) {
   const SavedState& s = known(saved);
   simulation.restore(s.simulation);
   state = s.state;
@@ -32,16 +32,16 @@ void Instance::setState(fmi2FMUstate saved) {
   findHostStep();
 }
 
-void Instance::freeState(fmi2FMUstate* saved) {
+void Instance::freeState(void** saved) {
   if (!saved || !*saved) return;
   known(*saved);
   savedStates.erase(*saved);
   *saved = nullptr;
 }
 
-std::size_t Instance::serializedStateSize(fmi2FMUstate saved) const { return serializedSize(known(saved), guid); }
+std::size_t Instance::serializedStateSize(void* saved) const { return serializedSize(known(saved), guid); }
 
-void Instance::serializeState(fmi2FMUstate saved, fmi2Byte bytes[], std::size_t size) const {
+void Instance::serializeState(void* saved, char bytes[], std::size_t size) const {
   const SavedState& s = known(saved);
   const std::size_t needed = serializedSize(s, guid);
   if (!bytes) throw Refused("the place for the bytes is a null pointer");
@@ -50,7 +50,7 @@ void Instance::serializeState(fmi2FMUstate saved, fmi2Byte bytes[], std::size_t 
   serialize(s, guid, bytes, needed);
 }
 
-void Instance::deserializeState(const fmi2Byte bytes[], std::size_t size, fmi2FMUstate* saved) {
+void Instance::deserializeState(const char bytes[], std::size_t size, void** saved) {
   if (!bytes) throw Refused("the array of bytes is a null pointer");
   if (!saved) throw Refused("the place for the state is a null pointer");
   auto fresh = std::make_unique<SavedState>();

@@ -14,7 +14,7 @@ fmi2Status refuse(fmi2Component c, const char* function) noexcept {
   if (!c) return fmi2Error;
   char line[100];
   std::snprintf(line, sizeof line, "%s: only co-simulation is supported", function);
-  static_cast<tiefmu::Instance*>(c)->logger.write(fmi2Error, tiefmu::Category::error, line);
+  static_cast<tiefmu::Instance*>(c)->log->write(tiefmu::Severity::error, tiefmu::Category::error, line);
   return fmi2Error;
 }
 

@@ -1,38 +1,26 @@
 // Which function may be called in which state: FMI 2.0, section 4.2.4 (state machine for co-simulation).
 #pragma once
 
-namespace tiefmu {
+#include <bit>
+#include <iterator>
 
-enum State : unsigned {
-  instantiated = 1,
-  initializationMode = 2,
-  stepComplete = 4,
-  stepInProgress = 8,  // never entered: fmi2DoStep returns when the step is done
-  stepFailed = 16,     // never entered: no step is discarded
-  stepCanceled = 32,   // never entered
-  terminated = 64,
-  error = 128,
-  fatal = 256,  // never entered
-};
+#include "state.hpp"
 
-constexpr const char* stateName(State state) {
-  switch (state) {
-    case instantiated: return "instantiated";
-    case initializationMode: return "initializationMode";
-    case stepComplete: return "stepComplete";
-    case stepInProgress: return "stepInProgress";
-    case stepFailed: return "stepFailed";
-    case stepCanceled: return "stepCanceled";
-    case terminated: return "terminated";
-    case error: return "error";
-    case fatal: return "fatal";
-  }
-  return "";
-}
+namespace tiefmu::fmi2 {
+
+// Names of the states, in the order of their bits. Those that no State of ours stands for are never entered: fmi2DoStep
+// returns when the step is done, and discards none.
+inline constexpr const char* stateNames[] = {"instantiated", "initializationMode", "stepComplete", "stepInProgress",
+                                             "stepFailed",   "stepCanceled",       "terminated",   "error",
+                                             "fatal"};
+
+constexpr const char* stateName(State state) { return stateNames[std::countr_zero(static_cast<unsigned>(state))]; }
 
 struct Call {
   const char* name;
-  unsigned allowed;  // states
+  unsigned allowed;  // states, by their bits
+
+  constexpr bool isAllowedIn(State state) const { return (allowed & static_cast<unsigned>(state)) != 0; }
 };
 
 consteval unsigned row(const char* marks) {
@@ -42,7 +30,7 @@ consteval unsigned row(const char* marks) {
       if (*marks == 'x') states |= bit;
       bit <<= 1;
     }
-  return bit == fatal << 1 ? states : throw "a row has one mark for each state";
+  return bit == 1u << std::size(stateNames) ? states : throw "a row has one mark for each state";
 }
 
 // fmi2GetTypesPlatform, fmi2GetVersion, fmi2Instantiate and fmi2FreeInstance need no instance or end it, and are
@@ -91,4 +79,4 @@ constexpr Call getStringStatus         {"fmi2GetStringStatus",          row(". .
 // clang-format on
 }  // namespace call
 
-}  // namespace tiefmu
+}  // namespace tiefmu::fmi2

@@ -1,16 +1,48 @@
 // The functions of FMI 2.0 co-simulation. Each goes through `guard`: no exception leaves the library.
 #include <cstdio>
 #include <exception>
+#include <type_traits>
 
+#include "fmi2_calls.hpp"
 #include "instance.hpp"
+#include "resource_folder.hpp"
 
 extern "C" {
 #include "fmi2Functions.h"
 }
 
 using namespace tiefmu;
+namespace call = fmi2::call;
+using fmi2::Call;
+
+static_assert(std::is_same_v<fmi2ValueReference, std::uint32_t> && std::is_same_v<fmi2Real, double> &&
+              std::is_same_v<fmi2Integer, int> && std::is_same_v<fmi2Byte, char> &&
+              std::is_same_v<fmi2FMUstate, void*> &&
+              std::is_same_v<fmi2String, const char*>);  // what the instance takes and gives
 
 namespace {
+
+// Copied from the caller's callbacks; the environment goes back to it with every message.
+class CallbackLog final : public Log {
+ public:
+  CallbackLog(const fmi2CallbackFunctions& functions, const char* instanceName, bool loggingOn)
+      : callback_(functions.logger), environment_(functions.componentEnvironment), instanceName_(instanceName) {
+    on = loggingOn;
+  }
+
+ private:
+  void send(Severity severity, const char* category, const char* message) const noexcept override {
+    const fmi2Status status = severity == Severity::error     ? fmi2Error
+                              : severity == Severity::warning ? fmi2Warning
+                                                              : fmi2OK;
+    // The callback takes a printf format; a message may hold any character.
+    if (callback_) callback_(environment_, instanceName_.c_str(), status, category, "%s", message);
+  }
+
+  fmi2CallbackLogger callback_;
+  fmi2ComponentEnvironment environment_;
+  std::string instanceName_;
+};
 
 // Runs body(instance) where the call is allowed. What goes wrong is logged and returned as fmi2Error; unless the call
 // was merely refused, the instance is then in the state `error`, which only fmi2Reset and fmi2SetFMUstate leave.
@@ -21,20 +53,20 @@ template <class Body> fmi2Status guard(fmi2Component component, const Call& call
     char line[2000];  // no allocation: memory may be what is lacking
     std::snprintf(line, sizeof line, "%s: %s", call.name, message);
     instance->state = next;
-    instance->logger.write(fmi2Error, Category::error, line);
+    instance->log->write(Severity::error, Category::error, line);
     return fmi2Error;
   };
   try {
-    if (!(call.allowed & instance->state))
-      throw Refused(std::string("not allowed in state ") + stateName(instance->state));
+    if (!call.isAllowedIn(instance->state))
+      throw Refused(std::string("not allowed in state ") + fmi2::stateName(instance->state));
     body(*instance);
     return fmi2OK;
   } catch (const Refused& e) {
     return fail(e.what(), instance->state);
   } catch (const std::exception& e) {
-    return fail(e.what(), error);
+    return fail(e.what(), State::error);
   } catch (...) {
-    return fail("unknown exception", error);
+    return fail("unknown exception", State::error);
   }
 }
 
@@ -70,12 +102,8 @@ fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2Str
     if (!fmuGUID) return fail("the GUID is a null pointer");
     if (!fmuResourceLocation) return fail("the resource location is a null pointer");
     if (fmuType != fmi2CoSimulation) return fail("only co-simulation is supported");
-    Logger logger;
-    logger.callback = functions->logger;
-    logger.environment = functions->componentEnvironment;
-    logger.instanceName = instanceName;
-    logger.on = loggingOn;
-    return new Instance(std::move(logger), loadResource(fmuResourceLocation, fmuGUID));
+    return new Instance(std::make_unique<CallbackLog>(*functions, instanceName, loggingOn),
+                        loadResource(fmuResourceLocation, fmuGUID));
   } catch (const std::exception& e) {
     return fail(e.what());
   } catch (...) {
@@ -87,7 +115,7 @@ void fmi2FreeInstance(fmi2Component c) { delete static_cast<Instance*>(c); }
 
 fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean loggingOn, size_t nCategories,
                                const fmi2String categories[]) {
-  return guard(c, call::setDebugLogging, [&](Instance& i) { i.setDebugLogging(loggingOn, nCategories, categories); });
+  return guard(c, call::setDebugLogging, [&](Instance& i) { i.log->choose(loggingOn, nCategories, categories); });
 }
 
 fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean /*toleranceDefined*/, fmi2Real /*tolerance*/,
@@ -104,7 +132,7 @@ fmi2Status fmi2ExitInitializationMode(fmi2Component c) {
 }
 
 fmi2Status fmi2Terminate(fmi2Component c) {
-  return guard(c, call::terminate, [](Instance& i) { i.state = terminated; });
+  return guard(c, call::terminate, [](Instance& i) { i.state = State::terminated; });
 }
 
 fmi2Status fmi2Reset(fmi2Component c) {
