@@ -92,6 +92,7 @@ Scene surface(const Case& what, int slaves, bool shuffled, int threads = 1) {
   for (const Vec3& x : places) tie.slaves.push_back(add(x, Motion::driven));
   scene.ties.push_back(tie);
   scene.settings.timeStep = 1e-6;
+  scene.settings.safety = 0.9;
   scene.settings.threads = threads;
   if (what.consistent) scene.settings.inertia = Inertia::consistent;
   return scene;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cereal/archives/portable_binary.hpp>
 #include <sstream>
+#include <tuple>
 #include <type_traits>
 
 #include "bytes.hpp"
@@ -149,17 +150,7 @@ template <class Archive> void field(Archive& a, Port& p) {
 }
 
 template <class Archive> void field(Archive& a, Settings& s) {
-  field(a, s.inertia);
-  field(a, s.reaction);
-  field(a, s.geometry);
-  field(a, s.position);
-  field(a, s.gravity);
-  field(a, s.method);
-  field(a, s.timeStep);
-  field(a, s.safety);
-  field(a, s.threads);
-  field(a, s.expose);
-  field(a, s.hide);
+  std::apply([&](const auto&... m) { (field(a, s.*m.member), ...); }, settingsMembers);
 }
 
 // Everything of a model but its tie report: an instance computes with all of it and shows none of that.
@@ -196,16 +187,15 @@ void requireFinite(const std::vector<double>& values, const char* what) {
   for (double v : values) require(std::isfinite(v), what);
 }
 
-template <class E> void requireEnum(E value, E last, const char* what) {
-  require(static_cast<int>(value) <= static_cast<int>(last), what);
+template <class E> void requireEnum(E value, const char* what) {
+  require(static_cast<std::size_t>(value) < words<E>.size(), what);
 }
 
 void checkSettings(const Settings& s) {
-  requireEnum(s.inertia, Inertia::consistent, "inertia");
-  requireEnum(s.reaction, Reaction::split, "reaction");
-  requireEnum(s.geometry, Geometry::small, "geometry");
-  requireEnum(s.position, Position::input, "position");
-  requireEnum(s.method, Method::rk4, "method");
+  const auto check = [&]<class T>(const SettingsMember<T>& m) {
+    if constexpr (std::is_enum_v<T>) requireEnum(s.*m.member, m.key);
+  };
+  std::apply([&](const auto&... m) { (check(m), ...); }, settingsMembers);
   require(s.threads >= 0 && s.threads <= mostThreads, "threads");
   require(s.gravity.allFinite() && std::isfinite(s.timeStep) && std::isfinite(s.safety), "settings");
 }
@@ -248,7 +238,7 @@ void checkSlaves(const Model& m) {
 void checkGroups(const Model& m) {
   std::size_t next = 0;
   for (const TieGroup& g : m.groups) {
-    requireEnum(g.coupling, Coupling::translation, "coupling");
+    requireEnum(g.coupling, "coupling");
     require(g.corners == 3 || g.corners == 4, "corners of a segment");
     require(g.firstSlave >= 0 && static_cast<std::size_t>(g.firstSlave) == next, "slave groups");
     require(!g.begin.empty() && g.begin.front() == 0, "segments");
@@ -287,7 +277,7 @@ void checkSprings(const Model& m) {
   for (const Spring& s : m.springs) {
     checkEnd(s.a);
     checkEnd(s.b);
-    requireEnum(s.kind, SpringKind::bushing, "kind of spring");
+    requireEnum(s.kind, "kind of spring");
     for (const Vec3* v : {&s.stiffness, &s.damping, &s.rotationalStiffness, &s.rotationalDamping, &s.arm, &s.anchor})
       require(v->allFinite(), "springs");
     require(std::isfinite(s.length), "springs");

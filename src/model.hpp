@@ -12,6 +12,8 @@
 
 namespace tiefmu {
 
+template <> inline constexpr auto words<Coupling> = std::array{"rotation", "mean-motion", "translation"};
+
 // Independent nodes (masters and points) are sorted into these groups, by ascending id inside each (along a curve where
 // ids are scattered: localOrder). Rotating nodes come first and free ones stand together, so that every array below is
 // a contiguous slice of its field: rotating = [0, begin[freeMaster]), free = [begin[rotatingFreeMaster],

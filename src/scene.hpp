@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <stdexcept>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include "math.hpp"
@@ -21,6 +22,19 @@ enum class Reaction : std::uint8_t { loads, full, split };
 enum class Geometry : std::uint8_t { finite, small };
 enum class Position : std::uint8_t { integrated, input };
 enum class Method : std::uint8_t { centralDifference, symplecticEuler, nohBathe, rk4 };
+
+// The words of a scene file for an enumeration, in its order. Python calls the values so, with _ for -.
+template <class E> inline constexpr std::array<const char*, 0> words{};
+template <> inline constexpr auto words<Motion> = std::array{"driven", "free", "fixed"};
+template <> inline constexpr auto words<Formulation> = std::array{"default", "optimized"};
+template <> inline constexpr auto words<SearchMethod> = std::array{"box", "nearest-node"};
+template <> inline constexpr auto words<SpringKind> = std::array{"axial", "bushing"};
+template <> inline constexpr auto words<Inertia> = std::array{"lumped", "consistent"};
+template <> inline constexpr auto words<Reaction> = std::array{"loads", "full", "split"};
+template <> inline constexpr auto words<Geometry> = std::array{"finite", "small"};
+template <> inline constexpr auto words<Position> = std::array{"integrated", "input"};
+template <>
+inline constexpr auto words<Method> = std::array{"central-difference", "symplectic-euler", "noh-bathe", "rk4"};
 
 struct SceneNodes {
   std::vector<std::int64_t> id;
@@ -44,8 +58,8 @@ struct SceneTie {
   std::string name;
   std::vector<int> segments;
   std::vector<int> slaves;
-  Formulation formulation = Formulation::standard;
-  SearchMethod search = SearchMethod::box;
+  Formulation formulation{};
+  SearchMethod search{};
   double searchDistance = 0;  // m; 0: root mean square of the master edges (box), longest diagonal (nearestNode)
   bool dropUnresolved = false;
 };
@@ -54,7 +68,7 @@ struct SceneSpring {
   std::string name;  // how messages call it, e.g. "spring 2"
   int a = -1;        // node index
   int b = -1;        // node index, or -1: ground at the start position of a
-  SpringKind kind = SpringKind::axial;
+  SpringKind kind{};
   Vec3 stiffness = Vec3::Zero();            // N/m; axial: the first entry
   Vec3 damping = Vec3::Zero();              // N s/m
   Vec3 rotationalStiffness = Vec3::Zero();  // N m/rad
@@ -71,18 +85,50 @@ struct ScenePort {
   Vec3 at = Vec3::Zero();  // m
 };
 
+// The tables [model], [integrator] and [interface]. What a scene leaves out python/tiefmu/schema.py fills in: here are
+// no defaults but zeros.
 struct Settings {
-  Inertia inertia = Inertia::lumped;
-  Reaction reaction = Reaction::loads;
-  Geometry geometry = Geometry::finite;
-  Position position = Position::integrated;
+  Inertia inertia{};
+  Reaction reaction{};
+  Geometry geometry{};
+  Position position{};
   Vec3 gravity = Vec3::Zero();  // m/s2
-  Method method = Method::centralDifference;
-  double timeStep = 0;  // s; 0: safety * limit
-  double safety = 0.9;
+  Method method{};
+  double timeStep = 0;                    // s; 0: safety * limit
+  double safety = 0;                      // above 0
   int threads = 0;                        // from 1 to mostThreads; 0: one, and no parameter of the FMU
-  std::vector<std::string> expose, hide;  // names of INTERFACE's last two tables
+  std::vector<std::string> expose, hide;  // names of modelDescription/table.hpp
 };
+
+// All members of Settings by their keys in a scene, for Python and for the FMU's resource.
+template <class T> struct SettingsMember {
+  const char* key;
+  T Settings::* member;
+};
+inline constexpr std::tuple settingsMembers{
+    SettingsMember{"inertia", &Settings::inertia},    SettingsMember{"reaction", &Settings::reaction},
+    SettingsMember{"geometry", &Settings::geometry},  SettingsMember{"position", &Settings::position},
+    SettingsMember{"gravity", &Settings::gravity},    SettingsMember{"method", &Settings::method},
+    SettingsMember{"time_step", &Settings::timeStep}, SettingsMember{"safety", &Settings::safety},
+    SettingsMember{"threads", &Settings::threads},    SettingsMember{"expose", &Settings::expose},
+    SettingsMember{"hide", &Settings::hide}};
+
+namespace detail {
+
+struct Anything { template <class T> operator T() const; };
+
+// How many members an aggregate has: how many initialisers it takes.
+template <class S, class... Given> consteval std::size_t memberCount() {
+  if constexpr (requires { S{Given{}..., Anything{}}; })
+    return memberCount<S, Given..., Anything>();
+  else
+    return sizeof...(Given);
+}
+
+}  // namespace detail
+
+static_assert(std::tuple_size_v<decltype(settingsMembers)> == detail::memberCount<Settings>(),
+              "a member of Settings is missing from settingsMembers");
 
 // A unit of the scene's own, for messages; everything here is in SI.
 struct Unit {

@@ -1,11 +1,8 @@
 // The solver's kernels for tests and studies: NumPy arrays in, NumPy arrays out.
-#include <nanobind/nanobind.h>
-#include <nanobind/ndarray.h>
 #include <nanobind/stl/pair.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
-#include <cstring>
 #include <memory>
 #include <utility>
 
@@ -13,37 +10,22 @@
 #include "../../src/search.hpp"
 #include "../../src/stability.hpp"
 #include "../../src/tie.hpp"
+#include "bindings.hpp"
+#include "convert.hpp"
 
-namespace nb = nanobind;
-using namespace nb::literals;
-using namespace tiefmu;
-
+namespace tiefmu {
 namespace {
 
-using Doubles = nb::ndarray<const double, nb::c_contig, nb::device::cpu>;
 using Ints = nb::ndarray<const int, nb::c_contig, nb::device::cpu>;
-using Result = nb::ndarray<nb::numpy, double>;
 
-Result array(std::vector<double> values, std::initializer_list<std::size_t> shape) {
-  auto* owned = new std::vector<double>(std::move(values));
-  nb::capsule owner(owned, [](void* p) noexcept { delete static_cast<std::vector<double>*>(p); });
-  return Result(owned->data(), shape, owner);
-}
-
-template <class T> nb::ndarray<nb::numpy, T> plain(std::vector<T> values) {
-  auto* owned = new std::vector<T>(std::move(values));
-  nb::capsule owner(owned, [](void* p) noexcept { delete static_cast<std::vector<T>*>(p); });
-  return nb::ndarray<nb::numpy, T>(owned->data(), {owned->size()}, owner);
-}
-
-int cornersOf(const Doubles& corners, Vec3* x) {
+int cornersOf(const Values& corners, Vec3* x) {
   const std::size_t n = corners.ndim() == 2 && corners.shape(1) == 3 ? corners.shape(0) : 0;
   if (n != 3 && n != 4) throw nb::value_error("corners must be of shape (3, 3) or (4, 3)");
   for (std::size_t i = 0; i < n; ++i) x[i] = at(corners.data(), static_cast<Eigen::Index>(i));
   return static_cast<int>(n);
 }
 
-void wants(const Doubles& a, std::size_t size, const char* what) {
+void wants(const Values& a, std::size_t size, const char* what) {
   if (a.size() != size)
     throw nb::value_error(
         (std::string(what) + " has " + std::to_string(a.size()) + " entries, not " + std::to_string(size)).c_str());
@@ -60,13 +42,6 @@ struct Group {
   SegmentRange all() const { return {0, tie.segments()}; }
 };
 
-Coupling couplingOf(const std::string& name) {
-  if (name == "rotation") return Coupling::rotation;
-  if (name == "mean-motion") return Coupling::meanMotion;
-  if (name == "translation") return Coupling::translation;
-  throw nb::value_error("coupling is one of 'translation', 'rotation', 'mean-motion'");
-}
-
 }  // namespace
 
 void bindKernels(nb::module_& parent) {
@@ -82,13 +57,13 @@ void bindKernels(nb::module_& parent) {
       [](int n, double xi, double eta) {
         if (n != 3 && n != 4) throw nb::value_error("n is 3 or 4");
         const Phi phi = shape(n, xi, eta);
-        return array({phi.begin(), phi.begin() + n}, {static_cast<std::size_t>(n)});
+        return numpy<double>({phi.begin(), phi.begin() + n}, {static_cast<std::size_t>(n)});
       },
       "n"_a, "xi"_a, "eta"_a, "Shape functions Phi of a quad (n = 4) or triangle (3), shape (n,).");
 
   m.def(
       "project",
-      [](Doubles corners, Doubles points) {
+      [](Values corners, Values points) {
         Vec3 x[4];
         const int n = cornersOf(corners, x);
         const std::size_t count = points.size() / 3;
@@ -107,14 +82,14 @@ void bindKernels(nb::module_& parent) {
           folded.push_back(p.folded);
         }
         nb::dict d;
-        d["local"] = array(std::move(local), {count, 2});
-        d["phi"] = array(std::move(phi), {count, static_cast<std::size_t>(n)});
-        d["clamped"] = array(std::move(clamp), {count, static_cast<std::size_t>(n)});
-        d["distance"] = array(std::move(distance), {count});
-        d["outside"] = array(std::move(outside), {count});
-        d["nearest"] = array(std::move(nearest), {count});
-        d["converged"] = plain(std::move(converged));
-        d["folded"] = plain(std::move(folded));
+        d["local"] = numpy<double>(std::move(local), {count, 2});
+        d["phi"] = numpy<double>(std::move(phi), {count, static_cast<std::size_t>(n)});
+        d["clamped"] = numpy<double>(std::move(clamp), {count, static_cast<std::size_t>(n)});
+        d["distance"] = numpy<double>(std::move(distance), {count});
+        d["outside"] = numpy<double>(std::move(outside), {count});
+        d["nearest"] = numpy<double>(std::move(nearest), {count});
+        d["converged"] = numpy(std::move(converged));
+        d["folded"] = numpy(std::move(folded));
         return d;
       },
       "corners"_a, "points"_a,
@@ -124,13 +99,13 @@ void bindKernels(nb::module_& parent) {
 
   m.def(
       "node_inertia",
-      [](Doubles corners) {
+      [](Values corners) {
         Vec3 x[4];
         const NodeInertia inertia = nodeInertia(cornersOf(corners, x), x);
         nb::dict d;
-        d["centre"] = array({inertia.centre.begin(), inertia.centre.end()}, {3});
+        d["centre"] = numpy<double>({inertia.centre.begin(), inertia.centre.end()}, {3});
         std::vector<double> matrix(inertia.ibar.data(), inertia.ibar.data() + 9);
-        d["ibar"] = array(std::move(matrix), {3, 3});
+        d["ibar"] = numpy<double>(std::move(matrix), {3, 3});
         d["lambda"] = inertia.lambda;
         d["condition"] = inertia.condition;
         return d;
@@ -139,7 +114,7 @@ void bindKernels(nb::module_& parent) {
 
   m.def(
       "search",
-      [](Doubles positions, Ints segments, Doubles slaves, const std::string& method, double distance) {
+      [](Values positions, Ints segments, Values slaves, const std::string& method, double distance) {
         if (segments.ndim() != 2 || segments.shape(1) != 4) throw nb::value_error("segments must be of shape (m, 4)");
         std::vector<Vec3> x;
         for (std::size_t i = 0; i < positions.size() / 3; ++i)
@@ -153,8 +128,9 @@ void bindKernels(nb::module_& parent) {
               throw nb::value_error("node index out of range");
           ids.push_back(static_cast<std::int64_t>(e) + 1);
         }
+        const SearchMethod by = fromWord<SearchMethod>(method);
         const SegmentSearch search(x, std::move(nodes), std::move(ids));
-        const bool box = method == "box";
+        const bool box = by == SearchMethod::box;
         if (!(distance > 0)) distance = box ? search.rootMeanSquareEdge() : search.longestDiagonal();
         std::vector<int> segment, rival;
         std::vector<double> gap, local;
@@ -168,13 +144,13 @@ void bindKernels(nb::module_& parent) {
         }
         nb::dict d;
         const std::size_t count = segment.size();
-        d["segment"] = plain(std::move(segment));
-        d["distance"] = array(std::move(gap), {count});
-        d["local"] = array(std::move(local), {count, 2});
+        d["segment"] = numpy(std::move(segment));
+        d["distance"] = numpy<double>(std::move(gap), {count});
+        d["local"] = numpy<double>(std::move(local), {count, 2});
         d["search_distance"] = distance;
-        d["rival"] = plain(std::move(rival));
-        d["crossing"] = plain(std::vector<int>(search.crossing()));
-        d["zero_area"] = plain(std::vector<int>(search.zeroArea()));
+        d["rival"] = numpy(std::move(rival));
+        d["crossing"] = numpy(std::vector<int>(search.crossing()));
+        d["zero_area"] = numpy(std::vector<int>(search.zeroArea()));
         return d;
       },
       "positions"_a, "segments"_a, "slaves"_a, "method"_a = "box", "distance"_a = 0.0,
@@ -187,12 +163,12 @@ void bindKernels(nb::module_& parent) {
   nb::class_<Group>(m, "Group", "Slaves tied to segments of one shape by one coupling, outside any scene.")
       .def(
           "__init__",
-          [](Group* self, const std::string& coupling, Ints nodes, Ints begin, Doubles weight, std::size_t nodeCount) {
+          [](Group* self, const std::string& coupling, Ints nodes, Ints begin, Values weight, std::size_t nodeCount) {
             if (nodes.ndim() != 2 || (nodes.shape(1) != 3 && nodes.shape(1) != 4))
               throw nb::value_error("nodes must be of shape (m, 3) or (m, 4)");
             Group g;
             g.nodes = nodeCount;
-            g.tie.coupling = couplingOf(coupling);
+            g.tie.coupling = fromWord<Coupling>(coupling);
             g.tie.corners = static_cast<int>(nodes.shape(1));
             g.tie.firstSlave = 0;
             g.tie.node.assign(nodes.data(), nodes.data() + nodes.size());
@@ -215,7 +191,7 @@ void bindKernels(nb::module_& parent) {
           "each segment; weight (slaves, n): Phi.")
       .def(
           "set_geometry",
-          [](Group& g, Doubles positions, Doubles offset) {
+          [](Group& g, Values positions, Values offset) {
             wants(positions, 3 * g.nodes, "positions");
             wants(offset, 3 * g.slaves, "offset");
             std::copy_n(offset.data(), offset.size(), g.offset.begin());
@@ -224,37 +200,37 @@ void bindKernels(nb::module_& parent) {
           "positions"_a, "offset"_a, "Node positions (nodes, 3) and offsets d (slaves, 3), m.")
       .def(
           "map_motion",
-          [](const Group& g, Doubles v, Doubles w) {
+          [](const Group& g, Values v, Values w) {
             wants(v, 3 * g.nodes, "v");
             wants(w, 3 * g.nodes, "w");
             std::vector<double> vs(3 * g.slaves), ws(3 * g.slaves);
             mapMotion(g.tie, g.all(), g.geometry(), v.data(), w.data(), vs.data(), ws.data());
-            return std::pair{array(std::move(vs), {g.slaves, 3}), array(std::move(ws), {g.slaves, 3})};
+            return std::pair{numpy<double>(std::move(vs), {g.slaves, 3}), numpy<double>(std::move(ws), {g.slaves, 3})};
           },
           "v"_a, "w"_a, "(v_s, w_s) = T (v, w); (nodes, 3) to (slaves, 3). w_s is zero for 'translation'.")
       .def(
           "distribute_loads",
-          [](const Group& g, Doubles force, Doubles moment) {
+          [](const Group& g, Values force, Values moment) {
             wants(force, 3 * g.slaves, "force");
             wants(moment, 3 * g.slaves, "moment");
             std::vector<double> f(3 * g.nodes), t(3 * g.nodes);
             distributeLoads(g.tie, g.all(), g.geometry(), force.data(), moment.data(), f.data(), t.data());
-            return std::pair{array(std::move(f), {g.nodes, 3}), array(std::move(t), {g.nodes, 3})};
+            return std::pair{numpy<double>(std::move(f), {g.nodes, 3}), numpy<double>(std::move(t), {g.nodes, 3})};
           },
           "force"_a, "moment"_a, "(f, t) = T^T (F, M); (slaves, 3) to (nodes, 3).")
       .def(
           "bias",
-          [](const Group& g, Doubles v, Doubles w) {
+          [](const Group& g, Values v, Values w) {
             wants(v, 3 * g.nodes, "v");
             wants(w, 3 * g.nodes, "w");
             std::vector<double> as(3 * g.slaves), zs(3 * g.slaves);
             addBias(g.tie, g.all(), g.geometry(), v.data(), w.data(), as.data(), zs.data());
-            return std::pair{array(std::move(as), {g.slaves, 3}), array(std::move(zs), {g.slaves, 3})};
+            return std::pair{numpy<double>(std::move(as), {g.slaves, 3}), numpy<double>(std::move(zs), {g.slaves, 3})};
           },
           "v"_a, "w"_a, "The part of the slaves' accelerations that is quadratic in velocities, (slaves, 3).")
       .def(
           "lumped",
-          [](const Group& g, Doubles positions, Doubles mass, Doubles inertia) {
+          [](const Group& g, Values positions, Values mass, Values inertia) {
             wants(positions, 3 * g.nodes, "positions");
             wants(mass, g.slaves, "mass");
             wants(inertia, g.slaves, "inertia");
@@ -265,22 +241,18 @@ void bindKernels(nb::module_& parent) {
             model.turningSlaves = g.tie.coupling == Coupling::translation ? 0 : static_cast<int>(g.slaves);
             model.slaveOffset = g.offset;
             model.nodePosition.assign(positions.data(), positions.data() + positions.size());
-            std::vector<double> m(g.nodes), j(g.nodes);
-            lumpedAdditions(model, mass.data(), inertia.data(), m.data(), j.data());
-            return std::pair{array(std::move(m), {g.nodes}), array(std::move(j), {g.nodes})};
+            std::vector<double> added(g.nodes), addedInertia(g.nodes);
+            lumpedAdditions(model, mass.data(), inertia.data(), added.data(), addedInertia.data());
+            return std::pair{numpy(std::move(added)), numpy(std::move(addedInertia))};
           },
           "positions"_a, "mass"_a, "inertia"_a, "D: mass (kg) and inertia (kg m2) added per node.");
 
   m.def(
       "stable_step",
-      [](const std::string& method, double omega, double c) {
-        for (const auto& [name, value] : {std::pair{"central-difference", Method::centralDifference},
-                                          std::pair{"symplectic-euler", Method::symplecticEuler},
-                                          std::pair{"noh-bathe", Method::nohBathe}, std::pair{"rk4", Method::rk4}})
-          if (method == name) return stableStep(value, omega, c);
-        throw nb::value_error("unknown method");
-      },
+      [](const std::string& method, double omega, double c) { return stableStep(fromWord<Method>(method), omega, c); },
       "method"_a, "omega"_a, "c"_a = 0.0, "Largest stable step (s) on x'' = -omega^2 x - c x'.");
   m.def("damper_prediction", &damperPrediction, "h"_a, "omega"_a, "c"_a,
         "beta in [0, 1] of the velocity v_(n-1/2) + beta h/2 a_(n-1) of the dampers in a central difference step.");
 }
+
+}  // namespace tiefmu
