@@ -69,7 +69,7 @@ def ties(scene: Scene, found: dict) -> list[dict]:
 def slave_rows(scene: Scene, found: dict, order: np.ndarray) -> list[dict]:
     s = {key: value[order] for key, value in found["slaves"].items()}
     n = s["corners"]
-    optimized = s["coupling"] == found["couplings"].index("meanMotion")
+    optimized = s["coupling"] == found["couplings"].index("mean-motion")
     corner = np.arange(4) < n[:, None]
     share = np.where(optimized[:, None], corner / n[:, None], s["weights"])
     names = [table.name for table in scene.ties]

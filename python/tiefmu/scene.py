@@ -7,6 +7,7 @@ over all nodes of the mesh, in SI. Search and mechanics are checked by the solve
 import os
 import re
 import sys
+from enum import Enum
 from pathlib import Path
 
 import numpy as np
@@ -290,8 +291,8 @@ class Assembly:
                 name,
                 segments.astype(np.int32),
                 slaves.astype(np.int32),
-                table.formulation,
-                table.search,
+                choice(_core.Formulation, table.formulation),
+                choice(_core.SearchMethod, table.search),
                 si("search_distance", table.search_distance),
                 table.unresolved == "drop",
             )
@@ -300,7 +301,7 @@ class Assembly:
                 f"spring {number}",
                 a.astype(np.int32),
                 b.astype(np.int32),
-                spring.kind,
+                choice(_core.SpringKind, spring.kind),
                 *(
                     np.broadcast_to(si(key, getattr(spring, key)), 3).copy()
                     for key in ("stiffness", "damping", "rotational_stiffness", "rotational_damping")
@@ -309,18 +310,26 @@ class Assembly:
         for port, nodes in zip(self.tables.interface.ports, self.ports):
             place = np.empty(0) if port["at"] is None else si("position", port["at"])
             scene.add_port(port["name"], nodes.astype(np.int32), isinstance(port["nodes"], list), place)
-        model, integrator, interface = self.tables.model, self.tables.integrator, self.tables.interface
-        scene.set_settings(
-            inertia=model.inertia,
-            reaction=model.reaction,
-            geometry=model.geometry,
-            position=model.position,
-            gravity=si("gravity", model.gravity),
-            method=integrator.method,
-            time_step=si("time_step", integrator.time_step),
-            safety=integrator.safety,
-            threads=integrator.threads,
-            expose=interface.expose,
-            hide=interface.hide,
-        )
+        scene.settings = self.settings()
         return scene
+
+    def settings(self) -> _core.Settings:
+        """The tables [model], [integrator] and [interface], key by key: one that the solver does not know is an
+        AttributeError."""
+        settings = _core.Settings()
+        for table in (self.tables.model, self.tables.integrator, self.tables.interface):
+            for key in type(table).model_fields:
+                value = getattr(table, key)
+                if key == "ports":
+                    continue
+                if isinstance(value, str):
+                    value = choice(type(getattr(settings, key)), value)
+                elif key in ("gravity", "time_step"):
+                    value = self.units.si(key, value)
+                setattr(settings, key, value)
+        return settings
+
+
+def choice(kind: type[Enum], word: str):
+    """The value of an enumeration of the solver that the scene file calls `word`."""
+    return kind[word.replace("-", "_")]

@@ -25,7 +25,7 @@ class Picture:
         index = np.where(corner, np.searchsorted(nodes["id"][by_id], slaves["nodes"]), 0)
         places = nodes["position"][by_id][index] if len(index) else np.zeros((0, 4, 3))
         # S = P + d, or C + d: the weights are those of the tie.
-        mean = slaves["coupling"] == found["couplings"].index("meanMotion")
+        mean = slaves["coupling"] == found["couplings"].index("mean-motion")
         weights = np.where(mean[:, None], corner / slaves["corners"][:, None], slaves["weights"])
         order = np.argsort(slaves["id"], kind="stable")
         feet = np.einsum("ji,jik->jk", weights, places)[order]

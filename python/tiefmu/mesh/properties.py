@@ -14,12 +14,12 @@ from typing import Any
 
 import numpy as np
 
-from .._core import SceneError
+from .._core import Motion, SceneError
 from ..schema import LARGEST, found, shortened, suggestion
 from .data import find, span
 
 NUMBERS = ("mass", "inertia", "stiffness", "rotational_stiffness")
-MOTIONS = ("driven", "free", "fixed")  # as enum class Motion in src/scene.hpp
+MOTIONS = tuple(motion.name for motion in Motion)
 COLUMNS = ("id", *NUMBERS, "motion", "rotations")
 WORDS: dict[str, dict[str, Any]] = {
     "motion": {name: number for number, name in enumerate(MOTIONS)},
