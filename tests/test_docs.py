@@ -151,3 +151,11 @@ def test_the_interface_page_names_every_variable():
     found = every_variable()
     assert len(found) > 40
     assert found <= documented
+
+
+def test_files_that_contributing_names_are_there():
+    text = (ROOT / "CONTRIBUTING.md").read_text()
+    named = re.findall(r"`((?:src|fmu|modelDescription|python|tests|docs|bench)/[\w/.*]+|test_\w+\.py)`", text)
+    assert len(named) > 20
+    for name in named:
+        assert list(ROOT.glob(f"tests/{name}" if name.startswith("test_") else name)), name
