@@ -86,7 +86,7 @@ void Integrator::rungeKutta(double tau, double h) {
     if (stage > 0) {
       for (std::size_t k = 0; k < size; ++k) y[k] = start_[k] + ahead[stage - 1] * h * rates_[k];
       d.inputsAt(tau, ahead[stage - 1] * h);
-      d.updateGeometry();
+      d.ties.updateGeometry();
       d.setForceVelocities(0, 0);
       d.evaluate();
     }
@@ -99,7 +99,7 @@ void Integrator::rungeKutta(double tau, double h) {
   for (std::size_t k = 0; k < size; ++k) y[k] = start_[k] + h / 6 * sum_[k];
   d.inputsAt(tau, h);
   d.normalise();
-  d.updateGeometry();
+  d.ties.updateGeometry();
   d.setForceVelocities(0, 0);
 }
 

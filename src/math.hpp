@@ -49,6 +49,15 @@ inline void turnQuaternion(double* q, const Vec3& angle) {
   q[3] = scale * next.z();
 }
 
+// Rate of the unit quaternion q (w, x, y, z) that turns at w (rad/s): (0, w) q / 2, 1/s.
+inline void quaternionRate(const double* q, const Vec3& w, double* rate) {
+  const Quat r = Quat(0, 0.5 * w.x(), 0.5 * w.y(), 0.5 * w.z()) * Quat(q[0], q[1], q[2], q[3]);
+  rate[0] = r.w();
+  rate[1] = r.x();
+  rate[2] = r.y();
+  rate[3] = r.z();
+}
+
 // Rotation vector (rad, length in [0, pi]) of a unit quaternion: the inverse of `exponential`.
 inline Vec3 logarithm(const Quat& q) {
   const double sign = q.w() < 0 ? -1.0 : 1.0;

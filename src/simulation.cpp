@@ -1,23 +1,21 @@
 #include "simulation.hpp"
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <cstdio>
 
+#include "directional_derivative.hpp"
+#include "divergence.hpp"
 #include "dynamics.hpp"
 #include "integrator.hpp"
-#include "stability.hpp"
+#include "outputs.hpp"
+#include "step_backup.hpp"
+#include "time_step_limit.hpp"
 
 namespace tiefmu {
 namespace {
 
-constexpr double runaway = 3e8;       // m/s, rad/s: no explicit solution that is still one gets there
-constexpr double farAway = 1e30;      // m: beyond it squares of lengths overflow before long
-constexpr int refreshEvery = 100;     // substeps between two looks at the highest frequency, at most
-constexpr double refreshTurn = 0.1;   // rad that the geometry turns between them, at most
-constexpr double largestTurn = 0.25;  // rad a substep, where the bias of consistent inertia is explicit
-constexpr int checkEvery = 16;        // substeps between two looks for divergence
+constexpr int checkEvery = 16;  // substeps between two looks for divergence
 constexpr double maxSubsteps = 1e9;
 constexpr double none = 1e30;
 
@@ -31,18 +29,18 @@ struct Simulation::Impl {
   std::vector<double> data;
   Dynamics dynamics;
   Integrator integrator;
-  Spectrum spectrum;
-  // What a step changes and cannot compute anew: the fields velocity .. integratorLimit (all driven: position .. work),
-  // without offsets where they follow from the segments' rotations.
-  std::vector<double> backup;
-  Slice kept[2];
+  TimeStepLimit limit;
+  DivergenceChecks checks;
+  Outputs outputs;
+  StepBackup backup;
+  std::unique_ptr<DirectionalDerivative> derivative;  // made at its first call
   double time = 0;
   std::int64_t substeps = 0;
   std::uint32_t flags = 0;
-  bool dampers = false, energy = false, integrates = false;
-  // Derived from `data`, never saved: geometry, gathered loads and outputs behind the inputs.
+  bool energy = false, integrates = false;
+  // What is derived from `data`, never saved, and must be computed anew before it is read.
+  bool portsDirty = true;  // motion of the ports' nodes
   bool geometryDirty = true, loadsDirty = true, outputsDirty = true, parametersDirty = true;
-  bool portsDirty = true;  // the ports' nodes
   bool prepared = false;
 
   explicit Impl(std::shared_ptr<const Model> m)
@@ -51,73 +49,17 @@ struct Simulation::Impl {
         data(layout.size),
         dynamics(*model, layout, data.data()),
         integrator(dynamics),
-        spectrum(dynamics) {
-    dampers = layout[Field::lagged].count > 0;
+        limit(dynamics),
+        checks(dynamics),
+        outputs(dynamics),
+        backup(dynamics) {
     energy = layout[Field::energy].count > 0;
     for (Field f : {Field::position, Field::segmentRotation, Field::orientation, Field::angle})
       integrates |= layout[f].count > 0;
-    if (model->anyFree()) {
-      const bool own = std::any_of(model->groups.begin(), model->groups.end(),
-                                   [](const TieGroup& g) { return g.coupling == Coupling::rotation; });
-      static_assert(allAre(Field::velocity, Field::position, Role::motion));
-      static_assert(adjacent(Field::position, Field::offset) && adjacent(Field::offset, Field::segmentRotation));
-      static_assert(allAre(Field::offset, Field::integratorLimit, Role::state));
-      kept[0] = layout.through(Field::velocity, Field::position);
-      kept[1] = layout.through(own ? Field::offset : Field::segmentRotation, Field::integratorLimit);
-      backup.resize(kept[0].count + kept[1].count);
-    }
-    // An all-driven scene loses what it cannot compute anew only where a segment collapses.
-    const bool frames = std::any_of(model->groups.begin(), model->groups.end(),
-                                    [](const TieGroup& g) { return g.coupling == Coupling::meanMotion; });
-    if (!model->anyFree() && frames && model->finite()) {
-      const bool own = std::any_of(model->groups.begin(), model->groups.end(),
-                                   [](const TieGroup& g) { return g.coupling == Coupling::rotation; });
-      static_assert(allAre(Field::segmentRotation, Field::work, Role::state));
-      kept[0] = layout.through(Field::position, own ? Field::offset : Field::position);
-      kept[1] = layout.through(Field::segmentRotation, Field::work);
-      backup.resize(kept[0].count + kept[1].count);
-    }
     for (int s = 0; s < 3 * model->turning(); ++s) integrates |= model->finite() && model->slaveOffset[s] != 0;
   }
 
   double* field(Field f) { return data.data() + layout[f].offset; }
-
-  double methodLimit() { return *field(Field::integratorLimit); }
-  double stepLimit() {
-    const double limit = *field(Field::safety) * methodLimit();
-    const double asked = *field(Field::timeStep);
-    const double turn = dynamics.hasBias() ? largestTurn / std::max(dynamics.turnRate(), 1e-30) : none;
-    return std::min({asked > 0 ? asked : none, limit, turn});
-  }
-
-  void computeLimits() {
-    double &frequency = *field(Field::highestFrequency), &damping = *field(Field::dampingRate);
-    frequency = damping = *field(Field::angleTurned) = 0;
-    *field(Field::nodalTimeStep) = nodalStep(*model, field(Field::addedMass), field(Field::addedInertia),
-                                             field(Field::stiffness), field(Field::rotationalStiffness));
-    if (model->anyFree() && !model->springs.empty()) {
-      frequency = std::sqrt(spectrum.largest(false, layout[Field::mode].count ? field(Field::mode) : nullptr).bound());
-      if (dampers) damping = spectrum.largest(true, nullptr).bound();
-    }
-    setLimits();
-  }
-
-  void setLimits() {
-    const double frequency = *field(Field::highestFrequency);
-    *field(Field::stableTimeStep) = frequency > 0 ? 2 / frequency : none;
-    *field(Field::integratorLimit) = stableStep(model->settings.method, frequency, *field(Field::dampingRate));
-  }
-
-  // Geometry changes the limit; the mode of the last look is where the next one starts.
-  void refreshLimits() {
-    *field(Field::angleTurned) = 0;
-    if (layout[Field::mode].count == 0) return;
-    const Spectrum::Value value = spectrum.refresh(field(Field::mode));
-    if (value.ritz > 0 && std::isfinite(value.bound())) {
-      *field(Field::highestFrequency) = std::sqrt(value.bound());
-      setLimits();
-    }
-  }
 
   void updatePorts() {
     if (portsDirty && dynamics.ports.anyDriven()) dynamics.movePorts();
@@ -127,8 +69,8 @@ struct Simulation::Impl {
   void updateGeometry() {
     updatePorts();
     if (!geometryDirty) return;
-    dynamics.updateGeometry();
-    checkSegments();
+    dynamics.ties.updateGeometry();
+    checks.checkSegments(time);
     if (flags & accelerationsValid) dynamics.updateMass();  // a restored state: nothing else will
     geometryDirty = false;
   }
@@ -139,10 +81,10 @@ struct Simulation::Impl {
       dynamics.evaluate();
       flags |= accelerationsValid;
     } else if (loadsDirty) {
-      dynamics.evaluateReactions();
+      dynamics.evaluateLoads();
     }
     loadsDirty = false;
-    checkPorts(0);
+    checks.checkPorts(time, 0);
   }
 
   double totalEnergy() { return dynamics.kineticEnergy() + dynamics.strainEnergy(); }
@@ -160,85 +102,8 @@ struct Simulation::Impl {
     work[Work::totalAtLastStep] = total;
   }
 
-  bool allWithin(std::size_t count, const double* value, double limit) {
-    std::atomic<bool> result{true};
-    dynamics.eachBlock(count, [&](std::size_t first, std::size_t last) {
-      if (!within(last - first, value + first, limit)) result = false;
-    });
-    return result;
-  }
-
-  void checkFinite() {
-    if (!model->anyFree()) return;
-    for (Field f : {Field::velocity, Field::spin}) {
-      const double* v = field(f);
-      const int last = f == Field::velocity ? model->freeEnd() : model->rotating();
-      if (allWithin(3 * (last - model->freeBegin()), v + 3 * model->freeBegin(), runaway)) continue;
-      for (int i = model->freeBegin(); i < last; ++i)
-        for (int k = 0; k < 3; ++k) {
-          if (std::abs(v[3 * i + k]) < runaway) continue;  // false for NaN
-          char text[200];
-          std::snprintf(
-              text, sizeof text, "diverged at t = %.9g s: %s of node %lld is %.3g %s; limit of the time step %.3g s",
-              time, f == Field::velocity ? "velocity" : "angular velocity", static_cast<long long>(model->nodeId[i]),
-              v[3 * i + k], f == Field::velocity ? "m/s" : "rad/s", methodLimit());
-          throw Diverged(text, layout[f].offset + static_cast<std::size_t>(3 * i + k));
-        }
-    }
-  }
-
-  // Of all nodes after h more at the present velocities (0: as they stand).
-  void checkPlaces(double h) {
-    const double *x = field(Field::position), *v = field(Field::velocity);
-    const std::size_t count = layout[Field::position].count;
-    if (allWithin(count, x, farAway / 2) && (h == 0 || allWithin(count, v, farAway / (2 * h)))) return;
-    for (std::size_t k = 0; k < layout[Field::position].count; ++k) {
-      if (std::abs(x[k] + h * v[k]) < farAway) continue;  // false for NaN
-      char text[120];
-      std::snprintf(text, sizeof text, "diverged at t = %.9g s: position of node %lld is %.3g m", time,
-                    static_cast<long long>(model->nodeId[k / 3]), x[k] + h * v[k]);
-      throw Diverged(text, layout[Field::position].offset + k);
-    }
-  }
-
-  // Ports of driven nodes after h more at the present velocities, and whether those of slaves still have a rotation.
-  void checkPorts(double h) {
-    if (model->ports.empty()) return;
-    char text[80];
-    std::snprintf(text, sizeof text, "diverged at t = %.9g s: ", time);
-    for (const auto& [place, rate] :
-         {std::pair{Field::portPlace, Field::portVelocity}, std::pair{Field::portRotation, Field::portSpin}})
-      for (std::size_t k = 0; k < layout[rate].count; ++k) {
-        const double from = place == Field::portPlace ? field(place)[k] : 0;
-        if (std::abs(from + h * field(rate)[k]) < farAway) continue;  // false for NaN
-        throw Diverged(text + ("port '" + model->ports[k / 3].name) + "' leaves the world", layout[rate].offset + k);
-      }
-    const std::string flat = dynamics.ports.findCollapsed();
-    if (!flat.empty()) throw Diverged(text + ("the slaves of port '" + flat) + "' have come to lie on a line");
-  }
-
-  void checkSegments() {
-    if (!model->finite()) return;
-    const std::string nodes = dynamics.findCollapsedSegment();
-    if (nodes.empty()) return;
-    char text[80];
-    std::snprintf(text, sizeof text, "diverged at t = %.9g s: ", time);
-    throw Diverged(text + ("the segment of nodes " + nodes) + " has collapsed to a line or a point");
-  }
-
-  void save() {
-    std::size_t to = 0;
-    for (const Slice& slice : kept) {
-      dynamics.eachBlock(slice.count, [&](std::size_t first, std::size_t last) {
-        std::copy_n(data.begin() + slice.offset + first, last - first, backup.begin() + to + first);
-      });
-      to += slice.count;
-    }
-  }
   void undo() {
-    dynamics.inputs.at(0, data.data());
-    std::copy_n(backup.begin(), kept[0].count, data.begin() + kept[0].offset);
-    std::copy_n(backup.begin() + kept[0].count, kept[1].count, data.begin() + kept[1].offset);
+    backup.restore();
     flags &= ~accelerationsValid;
     geometryDirty = loadsDirty = outputsDirty = portsDirty = true;
   }
@@ -254,13 +119,14 @@ struct Simulation::Impl {
       before = dynamics.power();
     }
     dynamics.inputsOver(0, duration);
-    if (dynamics.has(Field::position) && model->settings.position == Position::integrated) checkPlaces(duration);
+    if (dynamics.has(Field::position) && model->settings.position == Position::integrated)
+      checks.checkPositions(time, duration);
     if (integrates) dynamics.drift(duration, 0);
     dynamics.inputsAt(0, duration);
-    checkSegments();
+    checks.checkSegments(time);
     time += duration;
     if (!energy) return;
-    dynamics.evaluateReactions();
+    dynamics.evaluateLoads();
     const Dynamics::Power after = dynamics.power();
     field(Field::work)[Work::external] += 0.5 * duration * (before.external + after.external);
     field(Field::work)[Work::dissipated] += 0.5 * duration * (before.dissipated + after.dissipated);
@@ -277,12 +143,12 @@ struct Simulation::Impl {
     if (energy) before = dynamics.power();
     while (left > 0) {
       // Equal substeps; planned anew only when the limit has fallen below them.
-      double limit = stepLimit();
-      const double count = std::max(1.0, std::ceil(left / limit * (1 - 1e-12)));
+      const double largest = limit.ofStep();
+      const double count = std::max(1.0, std::ceil(left / largest * (1 - 1e-12)));
       if (!(count <= maxSubsteps)) {
         char text[160];
         std::snprintf(text, sizeof text, "a step of %.6g s would take %.3g substeps of at most %.3g s", duration, count,
-                      limit);
+                      largest);
         throw StepTooLong(text);
       }
       const std::int64_t n = static_cast<std::int64_t>(count);
@@ -305,19 +171,17 @@ struct Simulation::Impl {
           }
           before = after;
         }
-        if (substeps % checkEvery == 0) checkFinite();
-        double& turned = *field(Field::angleTurned);
-        turned += h * dynamics.turnRate();
-        if (substeps % refreshEvery == 0 || turned > refreshTurn) refreshLimits();
-        if (stepLimit() < h * (1 - 1e-9)) break;
+        if (substeps % checkEvery == 0) checks.checkVelocities(time, limit.ofMethod());
+        limit.update(h, substeps);
+        if (limit.ofStep() < h * (1 - 1e-9)) break;
       }
       left = done < n ? left - static_cast<double>(done) * h : 0;
     }
     time = end;
-    checkFinite();
-    if (dynamics.has(Field::position)) checkPlaces(0);
-    checkPorts(0);
-    checkSegments();
+    checks.checkVelocities(time, limit.ofMethod());
+    if (dynamics.has(Field::position)) checks.checkPositions(time, 0);
+    checks.checkPorts(time, 0);
+    checks.checkSegments(time);
     if (energy) field(Field::work)[Work::totalAtLastStep] = totalEnergy();
   }
 };
@@ -333,7 +197,7 @@ double Simulation::time() const { return impl_->time; }
 double* Simulation::data() { return impl_->data.data(); }
 const double* Simulation::data() const { return impl_->data.data(); }
 std::int64_t Simulation::evaluations() const { return impl_->dynamics.evaluations; }
-double Simulation::integratorLimit() const { return impl_->methodLimit(); }
+double Simulation::integratorLimit() const { return impl_->limit.ofMethod(); }
 
 void Simulation::inputsChanged() {
   impl_->flags &= ~accelerationsValid;
@@ -361,7 +225,7 @@ void Simulation::outputRates(double* rates) {
     restore(before);
     s.dynamics.evaluations = evaluations;
   };
-  const double limit = s.model->anyFree() ? s.stepLimit() : none;
+  const double limit = s.model->anyFree() ? s.limit.ofStep() : none;
   const double h = 1e-5 * std::min(limit, 1.0);
   try {
     if (s.model->accelerationInputs())
@@ -417,8 +281,8 @@ void Simulation::initialise(double time) {
   s.time = time;
   s.updatePorts();
   s.dynamics.prepare();
-  s.checkSegments();
-  s.computeLimits();
+  s.checks.checkSegments(time);
+  s.limit.compute();
   s.flags = initialised;
   s.prepared = true;
   s.geometryDirty = s.parametersDirty = false;
@@ -438,9 +302,9 @@ void Simulation::step(double duration) {
     s.time = time;
     s.substeps = substeps;
   };
-  s.save();
+  s.backup.save();
   try {
-    s.checkPorts(duration);
+    s.checks.checkPorts(s.time, duration);
     if (s.model->anyFree())
       s.integrate(duration);
     else
@@ -462,19 +326,20 @@ void Simulation::updateOutputs() {
   s.updatePorts();
   if (s.parametersDirty) {  // during initialisation parameters may still change
     s.dynamics.prepare();
-    s.computeLimits();
+    s.limit.compute();
     s.prepared = true;
     s.parametersDirty = false;
   }
   if (!s.outputsDirty) return;
   s.evaluate();
-  s.dynamics.updateOutputs();
+  s.outputs.update();
   s.outputsDirty = false;
 }
 
 void Simulation::directionalDerivative(double* derivative) {
   updateOutputs();
-  impl_->dynamics.directionalDerivative(derivative);
+  if (!impl_->derivative) impl_->derivative = std::make_unique<DirectionalDerivative>(impl_->dynamics);
+  impl_->derivative->evaluate(derivative);
 }
 
 void Simulation::save(State& state) const {

@@ -3,26 +3,13 @@
 #pragma once
 
 #include <memory>
-#include <stdexcept>
-#include <string>
 #include <vector>
 
 #include "input_curve.hpp"
 #include "layout.hpp"
+#include "step_errors.hpp"
 
 namespace tiefmu {
-
-// A step ended in a non-finite or runaway number, that at `place` of the array if it is one; the state before the step
-// has been put back.
-struct Diverged : std::runtime_error {
-  explicit Diverged(const std::string& message, std::size_t where = nowhere)
-      : std::runtime_error(message), place(where) {}
-  static constexpr std::size_t nowhere = ~std::size_t{0};
-  std::size_t place;
-};
-
-// A step that would take more than a thousand million substeps; the state before it has been put back.
-struct StepTooLong : std::runtime_error { using std::runtime_error::runtime_error; };
 
 class Simulation {
  public:

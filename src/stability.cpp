@@ -113,7 +113,7 @@ void Spectrum::apply(const double* x, double* y, bool damping) {
   std::fill(turn_.begin(), turn_.end(), 0.0);
   std::copy_n(x, free, u_.begin() + first);
   std::copy_n(x + free, turning, turn_.begin() + first);
-  dynamics_.springOperator(u_.data(), turn_.data(), f_.data(), t_.data(), damping);
+  dynamics_.springs.applyTangent(u_.data(), turn_.data(), f_.data(), t_.data(), damping);
   std::copy_n(f_.begin() + first, free, y);
   std::copy_n(t_.begin() + first, turning, y + free);
 }
