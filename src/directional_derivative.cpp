@@ -73,12 +73,6 @@ void DirectionalDerivative::distribute(const std::vector<double>& force, const s
     });
 }
 
-void DirectionalDerivative::turnIntoInertialLoads() {
-  const double *mass = d_.field(Field::slaveMass), *inertia = d_.field(Field::slaveInertia);
-  for (int s = 0; s < d_.model.slaves(); ++s) at(as_.data(), s) *= -mass[s];
-  for (int s = 0; s < d_.model.turning(); ++s) at(zs_.data(), s) *= -inertia[s];
-}
-
 // Of the slaves' accelerations, T dq'' + (dT) q'' + db, to as_, zs_. `v`, `w`: of the bias; its derivative along the
 // driven velocities is half the difference between both sides, exact for a quadratic form.
 void DirectionalDerivative::differentiateAccelerations(const double* da, const double* dz, const double* v,
@@ -129,7 +123,7 @@ void DirectionalDerivative::evaluateAccelerations() {
     d_.updateSlaveAccelerations(accelerations(), d_.field(Field::angularAcceleration), v, w);
     d_.turnIntoInertialLoads();
     differentiateAccelerations(da, dz, v, w);
-    turnIntoInertialLoads();
+    d_.turnIntoInertialLoads(as_.data(), zs_.data());
     distribute(as_, zs_, d_.slaveAcceleration().data(), d_.slaveAngularAcceleration().data());
   }
   for (int k = first; k < last; ++k) nodeLoad_[k] += f_[k];
@@ -219,7 +213,7 @@ void DirectionalDerivative::differentiateReactions() {
     d_.turnIntoInertialLoads();
     bias_ = as_;
     biasTurn_ = zs_;
-    turnIntoInertialLoads(bias_.data(), biasTurn_.data());
+    d_.turnIntoInertialLoads(bias_.data(), biasTurn_.data());
     distribute(bias_, biasTurn_, d_.slaveAcceleration().data(), d_.slaveAngularAcceleration().data());
   }
   if (!loads && (!consistent || split)) {

@@ -25,7 +25,6 @@ class DirectionalDerivative {
   void differentiateEnergies();
   void distribute(const std::vector<double>& force, const std::vector<double>& moment, const double* value,
                   const double* valueMoment);
-  void turnIntoInertialLoads();
   double* of(Field f) const { return derivative_ + d_.layout[f].offset; }  // derivative of a field
   const double* accelerations() const { return d_.has(Field::acceleration) ? d_.field(Field::acceleration) : nullptr; }
   // Of the nodes' positions: where they are inputs, else null.

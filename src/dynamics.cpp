@@ -123,10 +123,10 @@ void Dynamics::updateSlaveAccelerations(const double* a, const double* z, const 
   ties.mapAccelerations(a, z, v, w, as_.data(), zs_.data());
 }
 
-void Dynamics::turnIntoInertialLoads() {
+void Dynamics::turnIntoInertialLoads(double* as, double* zs) {
   const double *mass = field(Field::slaveMass), *inertia = field(Field::slaveInertia);
-  for (int s = 0; s < model.slaves(); ++s) at(as_.data(), s) *= -mass[s];
-  for (int s = 0; s < model.turning(); ++s) at(zs_.data(), s) *= -inertia[s];
+  for (int s = 0; s < model.slaves(); ++s) at(as, s) *= -mass[s];
+  for (int s = 0; s < model.turning(); ++s) at(zs, s) *= -inertia[s];
 }
 
 void Dynamics::evaluate() {

@@ -50,7 +50,8 @@ class Dynamics {
   // Slaves' accelerations T q'' + b (m/s2, rad/s2), kept until the next call; then in their place the loads
   // -m_s a_s, -I_s z_s of their inertia (N, N m).
   void updateSlaveAccelerations(const double* a, const double* z, const double* v, const double* w);
-  void turnIntoInertialLoads();
+  void turnIntoInertialLoads() { turnIntoInertialLoads(as_.data(), zs_.data()); }
+  void turnIntoInertialLoads(double* as, double* zs);  // the same with any such arrays
   std::vector<double>& slaveAcceleration() { return as_; }
   std::vector<double>& slaveAngularAcceleration() { return zs_; }
   // M^-1 of the free nodes, on node arrays: loads f, t to accelerations a, z, which hold a guess on entry.

@@ -16,6 +16,9 @@ using ConstMapVec3 = Eigen::Map<const Vec3>;
 inline MapVec3 at(double* p, Eigen::Index i) { return MapVec3(p + 3 * i); }
 inline ConstMapVec3 at(const double* p, Eigen::Index i) { return ConstMapVec3(p + 3 * i); }
 
+// (r.r) 1 - r r^T: inertia about the origin of a unit mass at r, m2. Sums over a segment's arms are Ibar, theory (1.2).
+inline Mat3 unitInertia(const Vec3& r) { return r.squaredNorm() * Mat3::Identity() - r * r.transpose(); }
+
 // The matrix of u x (.), so that skew(u) v = u x v.
 inline Mat3 skew(const Vec3& u) {
   Mat3 m;

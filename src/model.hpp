@@ -41,7 +41,7 @@ struct TieGroup {
   int firstSlave;              // index of the group's first slave in the slave arrays
   std::vector<int> node;       // corners per segment: independent node indices
   std::vector<int> begin;      // segments + 1: slaves of segment e are firstSlave + [begin[e], begin[e+1])
-  std::vector<double> weight;  // corners per slave: Phi at the projection
+  std::vector<double> weight;  // corners per slave: Phi at the projection, sum 1
   std::vector<int> partEnd;    // ends of Partition: parts for threads, then the separator
   int segments() const { return static_cast<int>(begin.size()) - 1; }
   int slaves() const { return begin.back(); }
@@ -59,10 +59,11 @@ struct SpringEnd {
 struct Spring {
   SpringEnd a, b;
   SpringKind kind;
-  Vec3 stiffness, damping, rotationalStiffness, rotationalDamping;  // axial: first entry of the first two
-  Vec3 arm;       // position of a minus position of b at the start (zero for ground)
-  Vec3 anchor;    // ground: where it is
-  double length;  // rest length of an axial spring
+  Vec3 stiffness, damping;                      // N/m, N s/m; axial: the first entry of each
+  Vec3 rotationalStiffness, rotationalDamping;  // N m/rad, N m s/rad
+  Vec3 arm;                                     // position of a minus position of b at the start, m (zero for ground)
+  Vec3 anchor;                                  // ground: where it is, m
+  double length;                                // rest length of an axial spring, m
 };
 
 // Nodes that the interface shows as one rigid body about a reference point.
@@ -74,8 +75,8 @@ struct Port {
   std::vector<double> arm;       // 3 per member, at the start: from the slaves' mean, or from the reference point, m
   Vec3 place = Vec3::Zero();     // reference point at the start, m
   Vec3 lever = Vec3::Zero();     // of slaves: from their mean to the reference point at the start, m
-  Vec3 velocity = Vec3::Zero();  // of driven nodes, at the start
-  Vec3 spin = Vec3::Zero();
+  Vec3 velocity = Vec3::Zero();  // of driven nodes, at the start, m/s
+  Vec3 spin = Vec3::Zero();      // rad/s
   // Slaves on a line: what the slaves' own rotations weigh beside their positions, m2. Else 0: they do not.
   double turnWeight = 0;
   std::vector<int> orientation;  // then, where there is a lever: per member its SpringEnd::orientation, or -1
@@ -94,8 +95,8 @@ struct Dropped {  // a slave that its tie's search did not find
 
 struct SlaveReport {
   std::int64_t segment = 0;  // id
-  double xi = 0, eta = 0;
-  double distance = 0;  // slave to its projection, m
+  double xi = 0, eta = 0;    // of the projection
+  double distance = 0;       // slave to its projection, m
   int tie = 0;
   bool clamped = false;  // its inertia uses the projection clamped to the segment
 };
@@ -106,17 +107,18 @@ struct Model {
   // independent nodes, sorted by group
   std::array<int, nodeGroups + 1> begin{};
   std::vector<std::int64_t> nodeId;
-  std::vector<int> nodeNumber;                     // i of master[i], p of point[p]: from 1 by ascending id
-  std::vector<double> nodePosition, nodeVelocity;  // 3 per node
-  std::vector<double> nodeSpin;                    // 3 per rotating node
-  std::vector<double> nodeMass, nodeInertia, nodeStiffness, nodeRotationalStiffness;
+  std::vector<int> nodeNumber;                                 // i of master[i], p of point[p]: from 1 by ascending id
+  std::vector<double> nodePosition, nodeVelocity;              // 3 per node at the start, m and m/s
+  std::vector<double> nodeSpin;                                // 3 per rotating node at the start, rad/s
+  std::vector<double> nodeMass, nodeInertia;                   // of its own, kg and kg m2
+  std::vector<double> nodeStiffness, nodeRotationalStiffness;  // declared, N/m and N m/rad
 
   // slaves: turning ones (rotation, meanMotion) first
   std::vector<std::int64_t> slaveId;
-  std::vector<int> slaveNumber;     // j of slave[j]: from 1 by ascending id
-  std::vector<double> slaveOffset;  // 3 per slave: d at the start
-  std::vector<double> slaveMass, slaveInertia;
-  std::vector<double> slaveStiffness, slaveRotationalStiffness;  // empty where no slave declares any
+  std::vector<int> slaveNumber;                                  // j of slave[j]: from 1 by ascending id
+  std::vector<double> slaveOffset;                               // 3 per slave: d at the start, m
+  std::vector<double> slaveMass, slaveInertia;                   // kg, kg m2
+  std::vector<double> slaveStiffness, slaveRotationalStiffness;  // N/m, N m/rad; empty where no slave declares any
   int turningSlaves = 0;                                         // how many can turn
   std::vector<TieGroup> groups;  // in slave order: rotation, meanMotion, translation; quads before triangles
 

@@ -1,6 +1,7 @@
 #include "partition.hpp"
 
 #include <algorithm>
+#include <cassert>
 #include <cstdint>
 
 namespace tiefmu {
@@ -11,6 +12,7 @@ constexpr int segmentsAPart = 1024, mostParts = 32;
 }  // namespace
 
 Partition partition(const std::vector<int>& node, int corners) {
+  assert((corners == 3 || corners == 4) && node.size() % corners == 0);
   const int segments = static_cast<int>(node.size()) / corners;
   const int parts = std::clamp(segments / segmentsAPart, 1, mostParts);
   const auto partOf = [&](int e) { return static_cast<int>(static_cast<std::int64_t>(e) * parts / segments); };

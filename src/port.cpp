@@ -2,6 +2,7 @@
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 
 #include "segment.hpp"
@@ -26,11 +27,9 @@ Mat3 closestRotation(const Mat3& h) {
 }  // namespace
 
 Mat3 armInertia(const std::vector<double>& arm) {
+  assert(arm.size() % 3 == 0);
   Mat3 sum = Mat3::Zero();
-  for (std::size_t i = 0; 3 * i < arm.size(); ++i) {
-    const Vec3 r = at(arm.data(), i);
-    sum += r.squaredNorm() * Mat3::Identity() - r * r.transpose();
-  }
+  for (std::size_t i = 0; 3 * i < arm.size(); ++i) sum += unitInertia(at(arm.data(), i));
   return sum;
 }
 

@@ -40,12 +40,12 @@ class Ports {
   void carry(const InputCurve& inputs, double tau, double h);
   void advance(const InputCurve& inputs, double tau, double h);  // after it: pose, positions and velocities at the end
   void moveDerivative(double* derivative) const;  // of the nodes' motion along the inputs', laid out like `data`
-  // Resultants of the nodes' loads (f 3 per node, t 3 per rotating node), added to force, moment (3 per port).
+  // Resultants of the nodes' loads (f 3 per node, N; t 3 per rotating node, N m), added to force, moment (3 per port).
   void gather(const double* f, const double* t, double* force, double* moment) const;
 
   // --- slaves
-  // Arms and J at slave positions `xs` (small displacements: as they were at the start). `quaternion(k)`: the rotation
-  // number k as SpringEnd::orientation counts.
+  // Arms and J at slave positions `xs` (m; small displacements: as they were at the start). `quaternion(k)`: the
+  // rotation number k as SpringEnd::orientation counts.
   template <class Quaternion> void shape(const double* xs, Quaternion quaternion);
   std::string findCollapsed() const;  // name of a port whose slaves have come to lie on a line; empty: none
   void distributeLoads(const double* force, const double* moment, double* fs,
@@ -62,8 +62,8 @@ class Ports {
     Vec3 lever = Vec3::Zero();
     int turning = 0;  // slaves whose rotation weighs
   };
-  struct Motion { Vec3 shift, turn; };  // over a drift: translation, rotation vector
-  struct Twist { Vec3 velocity, spin; };
+  struct Motion { Vec3 shift, turn; };    // over a drift: translation (m), rotation vector (rad)
+  struct Twist { Vec3 velocity, spin; };  // m/s, rad/s
   const Port& slavePort(std::size_t k) const { return model_.ports[driven_ + k]; }
   Motion motion(const InputCurve& inputs, std::size_t port, double tau, double h) const;
   Mat3 rotation(std::size_t port) const;

@@ -1,18 +1,12 @@
 // A scene as the stages of `compile` read it: segments' corners, and how messages call things.
 #pragma once
 
-#include <cstdio>
 #include <string>
 
 #include "scene.hpp"
+#include "text.hpp"
 
 namespace tiefmu {
-
-inline std::string text(double value) {
-  char buffer[32];
-  std::snprintf(buffer, sizeof buffer, "%.6g", value);
-  return buffer;
-}
 
 struct SceneView {
   explicit SceneView(const Scene& s) : scene(s) {}

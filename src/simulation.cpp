@@ -1,6 +1,7 @@
 #include "simulation.hpp"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <cstdio>
 
@@ -212,6 +213,7 @@ void Simulation::parametersChanged() {
 }
 
 void Simulation::setInputDerivative(std::size_t place, int order, double value) {
+  assert(place < impl_->layout.size && (order == 1 || order == 2));
   impl_->dynamics.inputs.set(place, order, value, impl_->layout);
 }
 
@@ -294,6 +296,7 @@ void Simulation::initialise(double time) {
 }
 
 void Simulation::step(double duration) {
+  assert(duration > 0 && std::isfinite(duration));
   Impl& s = *impl_;
   const double time = s.time;
   const std::int64_t substeps = s.substeps;
@@ -353,6 +356,7 @@ void Simulation::save(State& state) const {
 
 void Simulation::restore(const State& state) {
   Impl& s = *impl_;
+  assert(state.data.size() == s.layout.size);
   // What `prepare` keeps beside the array depends on the slaves' masses only.
   static_assert(adjacent(Field::slaveMass, Field::slaveInertia));
   const Slice masses = s.layout.through(Field::slaveMass, Field::slaveInertia);

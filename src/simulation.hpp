@@ -20,7 +20,7 @@ class Simulation {
 
   const Model& model() const;
   const Layout& layout() const;
-  double time() const;
+  double time() const;  // s
 
   // The array. After writing to it call `inputsChanged` (inputs, states) or `parametersChanged`.
   double* data();
@@ -51,7 +51,7 @@ class Simulation {
   // Saved state: `data` and what stands beside it. `restore` takes only what `save` of the same model gave.
   struct State {
     std::vector<double> data;
-    double time = 0;
+    double time = 0;  // s
     std::int64_t substeps = 0;
     std::uint32_t flags = 0;
     std::vector<InputDerivatives> inputs;  // for the next step

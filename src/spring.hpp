@@ -5,7 +5,7 @@
 
 namespace tiefmu {
 
-// Motion of one end: position m, velocity m/s, angular velocity rad/s, rotation since the start.
+// Motion of one end: position m, velocity m/s, angular velocity rad/s, rotation since the start (unit quaternion).
 struct EndMotion {
   Vec3 x = Vec3::Zero(), v = Vec3::Zero(), w = Vec3::Zero();
   Quat q = Quat::Identity();

@@ -1,6 +1,7 @@
 #include "spring_network.hpp"
 
 #include <algorithm>
+#include <cassert>
 
 namespace tiefmu {
 
@@ -14,6 +15,7 @@ SpringNetwork::SpringNetwork(const Model& model, const Layout& layout, double* d
 }
 
 const double* SpringNetwork::rotation(int index) const {
+  assert(index >= 0);
   const std::size_t k = static_cast<std::size_t>(index);
   return k < segmentRotations_ ? field(Field::segmentRotation) + 4 * k
                                : field(Field::orientation) + 4 * (k - segmentRotations_);
@@ -51,6 +53,7 @@ void SpringNetwork::addTo(const SpringEnd& end, const Vec3& force, const Vec3& m
 }
 
 void SpringNetwork::addLoads(const double* v, const double* w, const LoadArrays& to) {
+  assert(empty() || (to.f && to.fs && layout_[Field::position].count > 0));
   clear();
   slaves_.updateMotion(v, w);
   for (const Spring& spring : model_.springs) {

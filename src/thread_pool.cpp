@@ -16,6 +16,7 @@ void pause() {
 }  // namespace
 
 ThreadPool::ThreadPool(int threads) {
+  assert(threads > 0);
   threads_.reserve(threads - 1);
   try {
     for (int k = 1; k < threads; ++k) threads_.emplace_back([this] { work(); });

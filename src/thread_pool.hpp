@@ -2,6 +2,7 @@
 #pragma once
 
 #include <atomic>
+#include <cassert>
 #include <cstdint>
 #include <thread>
 #include <vector>
@@ -25,6 +26,7 @@ class ThreadPool {
       for (int k = 0; k < count; ++k) body(k);
       return;
     }
+    assert(count < 65536);
     run(count, [](const void* b, int k) { (*static_cast<const Body*>(b))(k); }, &body);
   }
   int threads() const { return static_cast<int>(threads_.size()) + 1; }

@@ -1,5 +1,8 @@
 #include "tie.hpp"
 
+#include <cassert>
+#include <cmath>
+
 #include "tie_kernels.hpp"
 
 namespace tiefmu {
@@ -15,6 +18,10 @@ const TieKernels* fastest() {
 const TieKernels* kernels = fastest();
 
 TieView view(const TieGroup& group, SegmentRange range) {
+  assert(group.corners == 3 || group.corners == 4);
+  assert(0 <= range.first && range.first <= range.last && range.last <= group.segments());
+  assert(group.node.size() == static_cast<std::size_t>(group.corners) * group.segments());
+  assert(group.weight.size() == static_cast<std::size_t>(group.corners) * group.slaves());
   return {group.coupling,     group.corners,      range, group.firstSlave, group.node.data(),
           group.begin.data(), group.weight.data()};
 }
@@ -28,11 +35,13 @@ bool useBaselineKernels(bool baseline) {
 
 void mapMotion(const TieGroup& group, SegmentRange range, TieGeometry geometry, const double* u, const double* turn,
                double* us, double* turns) {
+  assert(u && us);
   kernels->mapMotion(view(group, range), geometry, u, turn, us, turns);
 }
 
 void distributeLoads(const TieGroup& group, SegmentRange range, TieGeometry geometry, const double* force,
                      const double* moment, double* f, double* t) {
+  assert(force && f);
   kernels->distributeLoads(view(group, range), geometry, force, moment, f, t);
 }
 
@@ -46,30 +55,36 @@ void place(const TieGroup& group, SegmentRange range, TieGeometry geometry, cons
 }
 
 bool updateFrames(const TieGroup& group, SegmentRange range, const double* position, SegmentFrame* frame) {
+  assert(group.coupling == Coupling::meanMotion);
   return kernels->updateFrames(view(group, range), position, frame);
 }
 
 void turnOffsets(const TieGroup& group, SegmentRange range, double h, const double* spin, const double* inverseLength2,
                  double* offset) {
+  assert(group.coupling == Coupling::rotation && std::isfinite(h));
   kernels->turnOffsets(view(group, range), h, spin, inverseLength2, offset);
 }
 
 bool moveSegments(const TieGroup& group, SegmentRange range, double h, const double* position, const double* velocity,
                   SegmentFrame* frame, double* rotation) {
+  assert(group.coupling == Coupling::meanMotion && std::isfinite(h));
   return kernels->moveSegments(view(group, range), h, position, velocity, frame, rotation);
 }
 
 void rotateOffsets(const TieGroup& group, SegmentRange range, const double* rotation, const double* initialOffset,
                    double* offset) {
+  assert(group.coupling == Coupling::meanMotion);
   kernels->rotateOffsets(view(group, range), rotation, initialOffset, offset);
 }
 
 void meanSpin(const TieGroup& group, SegmentRange range, const SegmentFrame* frame, const double* velocity,
               double* spin) {
+  assert(group.coupling == Coupling::meanMotion);
   kernels->meanSpin(view(group, range), frame, velocity, spin);
 }
 
 void addScaled(std::size_t count, double h, const double* rate, double* value) {
+  assert(count == 0 || (rate && value));
   kernels->addScaled(count, h, rate, value);
 }
 

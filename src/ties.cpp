@@ -1,19 +1,11 @@
 #include "ties.hpp"
 
 #include <cmath>
-#include <cstdio>
 #include <system_error>
 
+#include "text.hpp"
+
 namespace tiefmu {
-namespace {
-
-std::string number(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.6g", value);
-  return text;
-}
-
-}  // namespace
 
 Ties::Ties(const Model& model, const Layout& layout, double* data) : model_(model), layout_(layout), data_(data) {
   const std::size_t s = model.slaves(), u = model.turning();
@@ -39,7 +31,7 @@ Ties::Ties(const Model& model, const Layout& layout, double* data) : model_(mode
 void Ties::startThreads() {
   const double threads = *field(Field::threads);
   if (!(threads >= 1 && threads <= mostThreads && threads == std::floor(threads)))
-    throw SceneError("integrator.threads is " + number(threads) + "; it must be a whole number from 1 to " +
+    throw SceneError("integrator.threads is " + text(threads) + "; it must be a whole number from 1 to " +
                      std::to_string(mostThreads));
   const int wanted = model_.shareable() ? static_cast<int>(threads) : 1;
   if (wanted == (pool_ ? pool_->threads() : 1)) return;
@@ -48,7 +40,7 @@ void Ties::startThreads() {
   try {
     pool_ = std::make_unique<ThreadPool>(wanted);
   } catch (const std::system_error& e) {
-    throw SceneError("integrator.threads is " + number(threads) + ", more than the system gives: " + e.what());
+    throw SceneError("integrator.threads is " + text(threads) + ", more than the system gives: " + e.what());
   }
 }
 
