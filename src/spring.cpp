@@ -1,12 +1,10 @@
 #include "spring.hpp"
 
 #include <algorithm>
-#include <cassert>
 
 namespace tiefmu {
 
 SpringLoad springLoad(const Spring& spring, const EndMotion& a, const EndMotion& b) {
-  assert(spring.kind != SpringKind::axial || spring.length > 0);
   SpringLoad load;
   const Vec3 line = a.x - b.x;
   if (spring.kind == SpringKind::axial) {
