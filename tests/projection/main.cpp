@@ -221,7 +221,11 @@ int main(int argc, char** argv) {
     ++c.tried;
     const tiefmu::Projection p = tiefmu::project(4, x, slave);
     Verdict verdict = judge(Oracle(x, slave, false), p);
-    if (verdict.wrong || verdict.refused) verdict = judge(Oracle(x, slave, true), p);
+    if (verdict.wrong || verdict.refused) {  // has the grid missed one?
+      Oracle oracle(x, slave, true);
+      if (p.converged) oracle.descend(p.xi, p.eta);
+      verdict = judge(oracle, p);
+    }
     c.folded += p.folded;
     c.none += verdict.none;
     c.doubtful += verdict.doubtful;
