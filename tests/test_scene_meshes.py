@@ -222,4 +222,4 @@ def test_every_slave_dropped(weld, scene_file, capsys):
     weld["mesh"]["nodes"][-1] = [101, 5.0, 5.0, 0.0]
     weld["tie"][0]["unresolved"] = "drop"
     line = line_of(scene_file, capsys, weld)
-    assert line.startswith("tie 'weld': every slave was dropped, so nothing is left; slave 101: no segment found ")
+    assert line.startswith("tie 'weld': all its slaves are dropped (slave 101: no segment found ")

@@ -43,19 +43,8 @@ class Scene:
         self.rotations = assembly.mesh.node_id[assembly.rotations]
         self.gravity = assembly.units.si("gravity", tables.model.gravity)
         self.model = _core.Model(assembly.scene())
-        if any(tie.unresolved == "drop" for tie in self.ties):
-            self.check_something_is_left()
         self.start = self.simulation()
         self.start.initialise(0.0)
-
-    def check_something_is_left(self) -> None:
-        """An FMU without variables is of no use to anyone."""
-        found = self.model.report()
-        if not len(found["nodes"]["id"]):
-            slave, tie, reason = found["dropped"][0]
-            raise SceneError(
-                f"tie '{self.ties[tie].name}': every slave was dropped, so nothing is left; slave {slave}: {reason}"
-            )
 
     def simulation(self) -> _core.Simulation:
         """A new simulation of this scene, as the FMU runs it; call `initialise(t)` first."""

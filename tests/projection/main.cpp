@@ -127,6 +127,8 @@ struct Oracle {
 };
 
 struct Verdict {
+  // A point inside the segment that is nearer than all the search has found, by its own map: the search has missed it.
+  bool missed = false;
   bool refused = false, wrong = false, none = false, doubtful = false;
   Real error = 0;  // of the point on the surface, in what rounding allows
   char line[400] = "";
@@ -137,6 +139,11 @@ Verdict judge(const Oracle& oracle, const tiefmu::Projection& p) {
   Real nearest;
   const Point* best = oracle.best(nearest);
   const Real noise = 16 * 2.3e-16L * (oracle.size + norm(oracle.s));  // what rounding leaves of differences
+  if (p.converged && p.outside <= 1) {
+    const Real own = norm(oracle.gap(p.xi, p.eta));
+    v.missed = own < nearest - noise && std::abs(own - p.distance) <= noise && std::abs(own - p.nearest) <= noise;
+    if (v.missed) return v;
+  }
   v.wrong = std::abs(p.nearest - nearest) > noise;
   v.none = !best;
   // Two corners in one place: there the program may find what is outside by xi alone, the slave's distance is the same.
@@ -168,7 +175,7 @@ Verdict judge(const Oracle& oracle, const tiefmu::Projection& p) {
 }
 
 struct Counts {
-  long tried = 0, crossing = 0, folded = 0, none = 0, doubtful = 0, refused = 0, wrong = 0;
+  long tried = 0, missed = 0, crossing = 0, folded = 0, none = 0, doubtful = 0, refused = 0, wrong = 0;
   Real error = 0;
 };
 
@@ -221,12 +228,9 @@ int main(int argc, char** argv) {
     ++c.tried;
     const tiefmu::Projection p = tiefmu::project(4, x, slave);
     Verdict verdict = judge(Oracle(x, slave, false), p);
-    if (verdict.wrong || verdict.refused) {  // has the grid missed one?
-      Oracle oracle(x, slave, true);
-      if (p.converged) oracle.descend(p.xi, p.eta);
-      verdict = judge(oracle, p);
-    }
+    if (verdict.wrong || verdict.refused || verdict.missed) verdict = judge(Oracle(x, slave, true), p);
     c.folded += p.folded;
+    c.missed += verdict.missed;
     c.none += verdict.none;
     c.doubtful += verdict.doubtful;
     c.refused += verdict.refused;
@@ -236,8 +240,9 @@ int main(int argc, char** argv) {
       std::printf("case %ld: aspect %.3g, warp %.3g, %s\n", c.tried, size / across, warp, verdict.line);
   }
   std::printf(
-      "%ld quads: %ld refused, %ld wrong; %ld without a projection within 1.5, %ld with two as near, %ld folded; "
+      "%ld quads: %ld refused, %ld wrong; %ld missed by the search itself, %ld without a projection within 1.5, %ld "
+      "with two as near, %ld folded; "
       "%ld crossing or without area left out; largest error %.3Lg of what rounding allows\n",
-      c.tried, c.refused, c.wrong, c.none, c.doubtful, c.folded, c.crossing, c.error);
+      c.tried, c.refused, c.wrong, c.missed, c.none, c.doubtful, c.folded, c.crossing, c.error);
   return c.refused + c.wrong > 0;
 }
