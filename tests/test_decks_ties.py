@@ -124,7 +124,7 @@ def test_pairs_farther_than_their_own_tolerance_are_dropped(tmp_path):
 
 
 def test_no_slave_within_its_tolerance(tmp_path):
-    with pytest.raises(decks.SceneError, match="tie 'weld': no slave is within its tolerance"):
+    with pytest.raises(decks.SceneError, match="tie 'weld': all its slaves are dropped"):
         read(default_tie().tie(1, 99, 1, 2, 1), tmp_path)
 
 
