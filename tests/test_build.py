@@ -85,8 +85,8 @@ def test_units_give_the_same_model(units, factors):
 
 
 def test_millimetres_and_tonnes_give_the_same_bits(weld):
-    """30 mm is the same double as 0.03 m: both are the nearest to the decimal number. With rotations there is nothing to
-    warn of: messages name lengths in the scene's unit."""
+    """30 mm is the same double as 0.03 m: both are the nearest to the decimal number. With rotations nothing is to be
+    said: messages name lengths in the scene's unit."""
     weld["node"][0]["rotations"] = True
     other = copy.deepcopy(weld) | {"units": {"length": "mm", "mass": "t", "time": "s"}}
     other["mesh"]["nodes"] = [[1, 0, 0, 0], [2, 100, 0, 0], [3, 100, 100, 0], [4, 0, 100, 0], [101, 30, 60, 40]]
