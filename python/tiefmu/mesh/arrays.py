@@ -24,13 +24,18 @@ def write(path: Path, node_id, position, segment_id, segments, node_sets: dict, 
         save(file, node_id=node_id, position=position, segment_id=segment_id, segments=segments, **sets)
 
 
-def read(path: Path) -> MeshFile:
+def load_npz(path: Path) -> dict[str, np.ndarray]:
+    """All arrays of the file. Raises SceneError, OSError."""
     with path.open("rb") as opened:
         try:  # NumPy's messages for damaged files are of many types
             with np.load(opened, allow_pickle=False) as file:
-                arrays = {key: file[key] for key in file.files}
+                return {key: file[key] for key in file.files}
         except Exception as error:
             raise SceneError(f"cannot be read as npz ({' '.join(str(error).split())})") from None
+
+
+def read(path: Path) -> MeshFile:
+    arrays = load_npz(path)
     for key, columns in SHAPES.items():
         array = arrays.get(key)
         if array is None:

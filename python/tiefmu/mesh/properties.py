@@ -16,6 +16,7 @@ import numpy as np
 
 from .._core import Motion, SceneError
 from ..schema import LARGEST, found, shortened, suggestion
+from .arrays import load_npz
 from .data import find, span
 
 NUMBERS = ("mass", "inertia", "stiffness", "rotational_stiffness")
@@ -169,12 +170,7 @@ def read_csv(path: Path) -> Table:
 
 
 def read_npz(path: Path) -> Table:
-    with path.open("rb") as opened:
-        try:  # NumPy's messages for damaged files are of many types
-            with np.load(opened, allow_pickle=False) as file:
-                arrays = {key: file[key] for key in file.files}
-        except Exception as error:
-            raise SceneError(f"cannot be read as npz ({' '.join(str(error).split())})") from None
+    arrays = load_npz(path)
     rows = {array.shape for array in arrays.values()}
     if len(rows) > 1 or any(len(shape) != 1 for shape in rows):
         raise SceneError("its columns are no arrays of one length")
