@@ -3,12 +3,11 @@
 Column layouts follow the reader configuration of OpenRadioss; docs/decks.md lists the keywords.
 """
 
-import difflib
 from pathlib import Path
 
 import numpy as np
 
-from ..._core import SceneError
+from ..choice import Choice
 from ..model import Deck
 from . import loads, mesh, tables, ties, units
 from .cards import Block
@@ -112,37 +111,18 @@ def warn_of_tables(deck: Deck, unknown: set[int], unread: set[int]):
 
 
 def read_ties(deck: Deck, sets: Sets, blocks: list[Block], default: ties.Defaults, wanted: list[str] | None):
-    known, asked = [], [name.strip().lower() for name in wanted] if wanted else None
-    found = set()
-
-    def choose(name: str, number: int) -> bool:
-        known.append(name)
-        if asked is None:
-            return True
-        hit = [word for word in asked if word in (name.lower(), str(number))]
-        found.update(hit)
-        return bool(hit)
-
+    choice = Choice(deck, "/INTER/TYPE2", wanted)
     for block in blocks:
         words = block.key[1:3]
         if words[:1] == ["TYPE2"] or words[:1] == ["TYPE02"]:
-            tie = ties.read(deck, sets, block, default, choose)
+            tie = ties.read(deck, sets, block, default, choice.wants)
             if tie is not None:
-                while any(tie.name == other.name for other in deck.ties):
-                    tie.name += f" ({block.id(2, 'other')})"
-                deck.ties.append(tie)
+                choice.add(tie, block.id(2, "other"))
         elif words == ["LAGMUL", "TYPE2"]:
             deck.warn(f"{block.where}: ties by Lagrange multipliers are not imported")
         else:
             left(deck, block, "contacts are the host's")
-    missing = [word for word in asked or [] if word not in found]
-    if missing:
-        close = difflib.get_close_matches(missing[0], [name.lower() for name in known], 1, 0.5)
-        names = [name for name in known if close and name.lower() == close[0]]
-        hint = f"; did you mean '{names[0]}'?" if names else f"; it has: {', '.join(known[:8])}" if known else ""
-        raise SceneError(f"{deck.file}: /INTER/TYPE2: no tie is called '{missing[0]}'{hint}")
-    if not deck.ties:
-        raise SceneError(f"{deck.file}: /INTER/TYPE2: the deck has no tie")
+    choice.finish()
 
 
 def lookup(deck: Deck, sets: Sets, name: str) -> np.ndarray | None:

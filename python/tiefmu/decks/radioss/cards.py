@@ -5,7 +5,6 @@ wide and reals 20 wide, in formats before 5.1 8 and 16 wide; the title of a bloc
 its first card since.
 """
 
-import math
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NoReturn
@@ -14,10 +13,9 @@ import numpy as np
 
 from ..._core import SceneError
 from ...schema import shortened
+from ..numbers import column, real, whole
 
 MOST_INCLUDES = 1000
-LARGEST_ID = 10**18
-UNDERSCORE = ord("_")
 
 
 @dataclass
@@ -164,46 +162,24 @@ class Cards:
         if step == 1:
             given = (text != 32).any(axis=1)
             text, index = text[given], index[given]
-        whole_columns = [
-            self._column(text[:, i * source.integer : (i + 1) * source.integer], np.int64, index, i * source.integer)
-            for i in range(integers)
-        ]
-        first = (integers + blank) * source.integer
-        real_columns = [
-            self._column(text[:, first + i * source.real : first + (i + 1) * source.real], float, index, first)
-            for i in range(reals)
-        ]
+
+        def columns(first: int, width: int, count: int, dtype) -> list[np.ndarray]:
+            found = []
+            for start in range(first, first + count * width, width):
+
+                def refuse(row: int, word: str, start=start):
+                    self.refuse(int(index[row]), start, width, dtype is float, word)
+
+                found.append(column(text[:, start : start + width], dtype, refuse))
+            return found
+
+        whole_columns = columns(0, source.integer, integers, np.int64)
+        real_columns = columns((integers + blank) * source.integer, source.real, reals, float)
         return (
             np.stack(whole_columns, axis=1) if integers else np.empty((len(index), 0), np.int64),
             np.stack(real_columns, axis=1) if reals else np.empty((len(index), 0)),
             index,
         )
-
-    def _column(self, text: np.ndarray, dtype, index: np.ndarray, first: int) -> np.ndarray:
-        """Numbers of one column (n, width) of characters."""
-        text = np.ascontiguousarray(text)
-        width = text.shape[1]
-        empty = (text == 32).all(axis=1)
-        if empty.any():
-            text[empty, -1] = ord("0")
-        if dtype is float:
-            text[(text == ord("D")) | (text == ord("d"))] = ord("e")
-        column = text.reshape(-1).view(f"S{width}")
-        if not (text == UNDERSCORE).any():  # NumPy takes 1_000, as Python does
-            try:
-                numbers = column.astype(dtype)
-                if np.all(np.abs(numbers) < (LARGEST_ID if dtype is np.int64 else np.inf)):
-                    return numbers
-            except (ValueError, OverflowError):
-                pass
-        found = np.empty(len(column), dtype)
-        for row, item in enumerate(column.tolist()):
-            word = item.decode("latin-1").strip()
-            try:
-                found[row] = whole(word) if dtype is np.int64 else real(word)
-            except (ValueError, OverflowError):
-                self.refuse(int(index[row]), first, width, dtype is float, word)
-        return found
 
     def refuse(self, card: int, first: int, width: int, real: bool, word: str):
         self.block.fail(
@@ -217,34 +193,6 @@ class Cards:
         whole_columns, _, _ = self.table(10, start=start)
         found = whole_columns.ravel()
         return found[found != 0]
-
-
-def whole(text: str) -> int:
-    if not text:
-        return 0
-    number = int(text)
-    if abs(number) >= LARGEST_ID or "_" in text:
-        raise ValueError
-    return number
-
-
-def real(text: str) -> float:
-    """Fortran's numbers: 1.5, 1.D-3, .3, 1.5-3."""
-    if not text:
-        return 0.0
-    text = text.replace("D", "e").replace("d", "e")
-    if "_" in text:
-        raise ValueError
-    try:
-        number = float(text)
-    except ValueError:
-        place = max(text.rfind("+"), text.rfind("-"))
-        if place <= 0 or text[place - 1] in "eE":
-            raise
-        number = float(f"{text[:place]}e{text[place:]}")
-    if not math.isfinite(number):
-        raise ValueError
-    return number
 
 
 def read(path: Path, file: str) -> list[Block]:
