@@ -307,22 +307,33 @@ def test_includes(tmp_path):
     assert nodes(whole, "n") == [1, 2, 3]
     assert segments(whole, "e") == [7]
     (tmp_path / "parts" / "more.txt").write_text("*INCLUDE, INPUT=nodes.txt\n")
-    with pytest.raises(tiefmu.SceneError, match=r"file: deck.inp: \*INCLUDE: nodes.txt includes itself"):
+    with pytest.raises(
+        tiefmu.SceneError, match=r"file: deck.inp: more.txt: line 1: \*INCLUDE: nodes.txt includes itself"
+    ):
         read(tmp_path, "*NODE, NSET=n\n*INCLUDE, INPUT=parts/nodes.txt\n")
 
 
 @pytest.mark.parametrize(
     "text, words",
     [
-        ("*NODE\n1,0,0,0\n*INSTANCE, NAME=a, PART=b\n*END INSTANCE\n", "instance 'a': there is no part 'b'"),
-        (PART + "*INSTANCE, NAME=a, PART=plate\n1,2,3,4\n*END INSTANCE\n", "instance 'a': expected a translation"),
+        (
+            "*NODE\n1,0,0,0\n*INSTANCE, NAME=a, PART=b\n*END INSTANCE\n",
+            "line 3: *INSTANCE: instance 'a': there is no part 'b'",
+        ),
+        (
+            PART + "*INSTANCE, NAME=a, PART=plate\n1,2,3,4\n*END INSTANCE\n",
+            "line 12: *INSTANCE: instance 'a': expected a translation",
+        ),
         (
             PART + "*INSTANCE, NAME=a, PART=plate\n1,2,3\n0,0,0,0,0,0,9\n*END INSTANCE\n",
-            "instance 'a': the axis of its rotation has no direction",
+            "line 12: *INSTANCE: instance 'a': the axis of its rotation has no direction",
         ),
-        (PART + "*INSTANCE, NAME=a, PART=plate\n*INSTANCE, NAME=A, PART=plate\n", "instance 'A' is repeated"),
-        ("*NODE, SYSTEM=Q\n1,0,0,0\n", "*NODE: SYSTEM = Q is none of R, C, S"),
-        ("*ELEMENT\n1,1,2,3\n", "*ELEMENT: parameter TYPE is missing"),
+        (
+            PART + "*INSTANCE, NAME=a, PART=plate\n*INSTANCE, NAME=A, PART=plate\n",
+            "line 13: *INSTANCE: instance 'A' is repeated",
+        ),
+        ("*NODE, SYSTEM=Q\n1,0,0,0\n", "line 1: *NODE: SYSTEM = Q is none of R, C, S"),
+        ("*ELEMENT\n1,1,2,3\n", "line 1: *ELEMENT: parameter TYPE is missing"),
     ],
 )
 def test_wrong_files(tmp_path, text, words):

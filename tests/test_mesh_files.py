@@ -92,21 +92,29 @@ def test_wrong_sets(abaqus_scene, tie, line):
 @pytest.mark.parametrize(
     "old, new, line",
     [
-        ("*ELEMENT, TYPE=S3, ELSET=right", "*ELEMENT, TYPE=S6, ELSET=right", "element 8 has 7 nodes, its type has 6"),
+        (
+            "*ELEMENT, TYPE=S3, ELSET=right",
+            "*ELEMENT, TYPE=S6, ELSET=right",
+            "line 18: *ELEMENT: element 8 has 7 nodes, its type has 6",
+        ),
         (" 901, 902, 1", " 901, 903, 1", "set 'welds': node 903 is not in the file"),
-        (" 901, 902, 1", " 901, 902, 1, 1", "set 'welds': GENERATE takes first, last and step, found '901, 902, 1, 1'"),
-        (" 7, 10, 20, 30, 40", " 7, 10, 20", "element 7 has 2 nodes, its type has 4"),
+        (
+            " 901, 902, 1",
+            " 901, 902, 1, 1",
+            "line 21: *NSET: set 'welds': GENERATE takes first, last and step, found '901, 902, 1, 1'",
+        ),
+        (" 7, 10, 20, 30, 40", " 7, 10, 20", "line 16: *ELEMENT: element 7 has 2 nodes, its type has 4"),
         (" 7, 10, 20, 30, 40", " 7, 10, 20, 30, 41", "segment 7: node 41 is not in the mesh (ids 10..902)"),
-        (" 60, 0.2, 0.1, 0.", " 60, 0.2, x, 0.", "*NODE: cannot be read (could not convert string to float: ' x')"),
+        (" 60, 0.2, 0.1, 0.", " 60, 0.2, x, 0.", "line 10: *NODE: expected a number, found 'x'"),
         (" 60, 0.2, 0.1, 0.", " 60, 0.2, nan, 0.", "node 60: a coordinate is not a finite number"),
-        (" 60, 0.2, 0.1, 0.", " 50, 0.2, 0.1, 0.", "node 50 is repeated"),
+        (" 60, 0.2, 0.1, 0.", " 50, 0.2, 0.1, 0.", "line 10: *NODE: node 50 is repeated"),
         (
             "*NSET, NSET=rim",
             "*NGEN\n 1, 2, 3\n*NSET, NSET=rim",
-            "*NGEN makes or moves nodes without listing them; write the mesh out in full",
+            "line 22: *NGEN: makes or moves nodes without listing them; write the mesh out in full",
         ),
         (" panel, right", " panels", "set 'whole': 'panels' is neither an id nor a set"),
-        ("** a quad", "*INCLUDE, INPUT=more.inp\n** a quad", "*INCLUDE: "),
+        ("** a quad", "*INCLUDE, INPUT=more.inp\n** a quad", "line 2: *INCLUDE: more.inp: No such file or directory"),
     ],
 )
 def test_wrong_abaqus_files(abaqus_scene, old, new, line):

@@ -162,7 +162,7 @@ def hold(deck: Deck, slave: np.ndarray, master: np.ndarray, loose: np.ndarray) -
     if len(tied):
         deck.warn(
             f"{len(tied)} slaves, the first is node {deck.node_id[tied[0]]}, are held by boundary conditions too; the "
-            "tie wins, as it does in the starter"
+            "tie wins"
         )
     imposed = np.zeros(n, bool)
     imposed[deck.imposed] = True
@@ -349,10 +349,7 @@ def rigid_ports(deck: Deck, written: Written, driven: np.ndarray, slave: np.ndar
         members = np.union1d(body.nodes, [body.main]) if body.main >= 0 else body.nodes
         if slave[members].any():
             node = deck.node_id[members[slave[members]][0]]
-            deck.warn(
-                f"{body.where}: rigid body '{body.name}' holds slaves, the first is node {node}; the tie wins, as it "
-                "does in the starter"
-            )
+            deck.warn(f"{body.where}: rigid body '{body.name}' holds slaves, the first is node {node}; the tie wins")
         members = members[driven[members] & ~taken[members]]
         if not len(members):
             continue

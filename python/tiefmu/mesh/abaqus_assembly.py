@@ -12,6 +12,7 @@ import numpy as np
 
 from .._core import SceneError
 from ..schema import shortened
+from . import abaqus_cards as cards
 from .abaqus import InputFile, Instance, Part, SetLine, Surface
 from .data import Block, MeshFile, Sets, find, refuse_repeated
 from .faces import FACES
@@ -30,10 +31,27 @@ class Scope:
         self.name, self.content, self.instance, self.offset = name, content, instance, 0
 
     def node_ids(self) -> np.ndarray:
-        return np.concatenate([NONE, *(ids for part in self.content for ids, _ in part.nodes)])
+        return np.concatenate([NONE, *(ids for part in self.content for ids, *_ in part.nodes)])
 
     def element_ids(self) -> np.ndarray:
         return np.concatenate([NONE, *(block.ids for part in self.content for block in part.blocks)])
+
+    def second_place(self, what: str) -> str:
+        """How messages call the line that repeats an id."""
+        if what == "node":
+            pieces = [(ids, card) for part in self.content for ids, _, card in part.nodes]
+        else:
+            pieces = [(b.ids, card) for part in self.content for b, card in zip(part.blocks, part.element_cards)]
+        known = NONE
+        for ids, card in pieces:
+            first = np.zeros(len(ids), bool)
+            first[np.unique(ids, return_index=True)[1]] = True
+            again = ~first | np.isin(ids, known)
+            if again.any():
+                row = int(np.argmax(again))
+                return card.at(row) if len(card.lines) == len(ids) else card.where
+            known = np.concatenate([known, ids])
+        return ""
 
     def definitions(self, which: str) -> list[Sets]:
         return [getattr(part, which) for part in self.content]
@@ -48,18 +66,25 @@ class Assembly:
         for instance in file.instances:
             part = file.parts.get(instance.part.upper())
             if part is None:
-                raise SceneError(f"instance '{instance.own.name}': there is no part '{shortened(instance.part)}'")
+                raise SceneError(
+                    f"{instance.where}: instance '{instance.own.name}': there is no part '{shortened(instance.part)}'"
+                )
             self.scopes.append(Scope(instance.own.name, [part, instance.own], instance))
         if not file.instances:  # parts that no assembly places stand where they are
             self.scopes += [Scope(part.name, [part]) for part in file.parts.values()]
         self.by_name = {scope.name.upper(): scope for scope in self.scopes}
         if len(self.by_name) < len(self.scopes):
             names = [scope.name.upper() for scope in self.scopes]
-            raise SceneError(f"instance '{next(name for name in names if names.count(name) > 1)}' is repeated")
+            again = next(k for k, name in enumerate(names) if name in names[:k])
+            where = file.instances[again].where if file.instances else ""
+            raise SceneError(f"{where}: instance '{names[again]}' is repeated")
         self.root = Scope("", [file.root])
         self.scopes.append(self.root)
         self.make_unique()
         self.element_id, self.blocks = NONE, []
+        self.order = NONE  # of element_id
+        self.cards: list[cards.Block] = []  # of the blocks
+        self.scope_of_block: list[Scope] = []
         self.busy: set[tuple] = set()  # sets being resolved, to find those that hold themselves
         self.known: dict[tuple, object] = {}
 
@@ -67,8 +92,11 @@ class Assembly:
         nodes = [scope.node_ids() for scope in self.scopes]
         elements = [scope.element_ids() for scope in self.scopes]
         for what, lists in (("node", nodes), ("element", elements)):
-            for ids in lists:
-                refuse_repeated(what, ids)
+            for ids, scope in zip(lists, self.scopes):
+                try:
+                    refuse_repeated(what, ids)
+                except SceneError as error:
+                    raise SceneError(f"{scope.second_place(what)}: {error}") from None
         if not any(repeats(np.concatenate(ids)) for ids in (nodes, elements)):
             return
         step = 10 ** len(str(max(int(ids.max(initial=0)) for ids in nodes + elements)))
@@ -86,10 +114,12 @@ class Assembly:
         position = [np.empty((0, 3))]
         for scope in self.scopes:
             for part in scope.content:
-                position += [placed(x, scope.instance) for _, x in part.nodes]
+                position += [placed(x, scope.instance) for _, x, _ in part.nodes]
                 for block in part.blocks:
                     nodes = np.where(block.nodes > 0, block.nodes + scope.offset, 0)
                     self.blocks.append(Block(block.shape, block.ids + scope.offset, nodes))
+                    self.scope_of_block.append(scope)
+                self.cards += part.element_cards
         self.element_id = np.concatenate([NONE, *(block.ids for block in self.blocks)])
         self.block_of = np.repeat(np.arange(len(self.blocks)), [len(block.ids) for block in self.blocks])
         first_row = np.cumsum([0, *(len(block.ids) for block in self.blocks)])
@@ -217,7 +247,9 @@ class Assembly:
             raise SceneError(f"there is no element set '{name}'") from None
 
     def rows_of(self, ids: np.ndarray) -> np.ndarray:
-        rows = find(self.element_id, ids)
+        if len(self.order) != len(self.element_id):
+            self.order = np.argsort(self.element_id, kind="stable")
+        rows = find(self.element_id, ids, self.order)
         if (rows < 0).any():
             raise SceneError(f"element {ids[rows < 0][0]} is not in the file")
         return rows
@@ -295,7 +327,7 @@ def placed(position: np.ndarray, instance: Instance | None) -> np.ndarray:
     a, b, angle = instance.rotation[:3], instance.rotation[3:6], np.radians(instance.rotation[6])
     length = np.linalg.norm(b - a)
     if not 0 < length < np.inf:
-        raise SceneError(f"instance '{instance.own.name}': the axis of its rotation has no direction")
+        raise SceneError(f"{instance.where}: instance '{instance.own.name}': the axis of its rotation has no direction")
     axis, arm = (b - a) / length, position - a
     along = np.outer(arm @ axis, axis)
     return a + along + (arm - along) * np.cos(angle) + np.cross(axis, arm) * np.sin(angle)

@@ -330,11 +330,12 @@ class Mesh:
         return index
 
 
-def find(ids: np.ndarray, wanted: np.ndarray) -> np.ndarray:
-    """Index of each wanted id in ids; -1 where there is none."""
+def find(ids: np.ndarray, wanted: np.ndarray, order: np.ndarray | None = None) -> np.ndarray:
+    """Index of each wanted id in ids; -1 where there is none. order: that sorts ids, where it is known."""
     if not len(ids):
         return np.full(np.shape(wanted), -1)
-    order = np.argsort(ids, kind="stable")
+    if order is None:
+        order = np.argsort(ids, kind="stable")
     place = np.minimum(np.searchsorted(ids, wanted, sorter=order), len(ids) - 1)
     index = order[place]
     return np.where(ids[index] == wanted, index, -1)

@@ -14,6 +14,9 @@ from .._core import SceneError
 from ..schema import shortened
 from .data import Block, MeshFile, Sets, find
 from .faces import CORNERS
+from .fields import FieldError
+from .fields import numbers as fortran_numbers
+from .fields import whole as fortran_whole
 
 # card: shape, most nodes, field of the first node, field of the property or None (fields behind the name, from 0)
 ELEMENTS = {
@@ -277,37 +280,16 @@ def listed(words: list[str], name: str) -> np.ndarray:
     return np.concatenate([np.empty(0, np.int64), *ids])
 
 
-def whole(items: list[str], name: str, blank: str | None = None) -> np.ndarray:
+def whole(items: list[str], name: str, blank: str = "") -> np.ndarray:
     try:
-        if blank is not None:
-            items = [item if item.strip() else blank for item in items]
-        values = list(map(int, items))
-    except ValueError:
-        bad = next(item for item in items if not re.fullmatch(r"\s*[+-]?\d+\s*", item))
-        raise SceneError(f"{name}: expected a whole number, found '{shortened(bad.strip())}'") from None
-    if values and not -(2**63) <= min(values) <= max(values) < 2**63:
-        raise SceneError(f"{name}: {shortened(str(max(values)))} is no id")
-    return np.array(values, np.int64)
+        return fortran_whole(items, blank)
+    except FieldError as error:
+        raise SceneError(f"{name}: {error}") from None
 
 
 def numbers(items: list[str]) -> np.ndarray:
     """Numbers as Nastran writes them (1.5-3 and 1.D0); blank: 0."""
     try:
-        return np.array(list(map(float, items)))
-    except ValueError:
-        return np.array([number(item.strip()) for item in items])
-
-
-def number(text: str) -> float:
-    if not text:
-        return 0.0
-    try:
-        return float(
-            re.sub(r"(?<=[\d.])[dD]?(?=[+-])", "e", text.replace("D", "e").replace("d", "e").replace("E", "e"))
-        )
-    except ValueError:
-        pass
-    try:
-        return float(re.sub("[dD]", "e", text))
-    except ValueError:
-        raise SceneError(f"GRID: expected a number, found '{shortened(text)}'") from None
+        return fortran_numbers(items)
+    except FieldError as error:
+        raise SceneError(f"GRID: {error}") from None
