@@ -10,7 +10,7 @@ import tomllib
 from conftest import toml
 from tiefmu import advise as advising
 from tiefmu.cli import main
-from tiefmu.run import inputs_beside
+from tiefmu.signals import inputs_beside
 from tiefmu.study import motion, speed_accuracy_runs
 from tiefmu.study.motion import Signals
 from tiefmu.study.variants import Source

@@ -123,7 +123,16 @@ def test_run_writes_csv_and_picture(weld, scene_file, capsys, tmp_path, argument
     (tmp_path / "in.csv").write_text("time,slave[1].f[3],master[1].v[3]\n0,0,1\n1,100,1\n")
     capsys.readouterr()
     assert main([*arguments, "--input", "in.csv", "--step", "0.25", "--output", "out.csv", "--plot", "out.png"]) == 0
-    assert capsys.readouterr().out == f"{arguments[1]}: 4 steps to t = 1 s, 15 outputs, wrote out.csv, wrote out.png\n"
+    first, *figures = capsys.readouterr().out.splitlines()
+    assert first == f"{arguments[1]}: 4 steps to t = 1 s, 15 outputs, wrote out.csv, wrote out.png"
+    # the slave's 75 N at xi = -0.4, eta = 0.2: the fourth master has (1 - xi)(1 + eta)/4 = 0.42 of it
+    assert figures[:4] == [
+        "  largest reaction  31.5 N at master[4].f (node 4), t = 1 s",
+        '  energy balance    not shown: expose = ["energy"] in [interface]',
+        '  drift             not shown: expose = ["drift"] in [interface]',
+        "  substeps          1 a step, by the limit at the start",
+    ]
+    assert figures[4].startswith("  wall time ") and len(figures) == 5
     header, values = rows("out.csv")
     assert header[0] == "time" and set(header[1:]) == {f"slave[1].v[{k}]" for k in (1, 2, 3)} | {
         f"master[{i}].f[{k}]" for i in (1, 2, 3, 4) for k in (1, 2, 3)
@@ -211,6 +220,12 @@ def test_wrong_inputs(weld, scene_file, capsys, tmp_path, case):
         (["run", "damaged.fmu"], "damaged.fmu: cannot be unpacked: Bad CRC-32 for file 'resources/report.json'"),
         (["run", "weld.toml", "--output", "no/out.csv"], "no/out.csv: folder no does not exist"),
         (["run", "weld.toml", "--plot", "no/out.png"], "no/out.png: folder no does not exist"),
+        (
+            ["run", "weld.toml", "--output", "out.txt"],
+            "out.txt: results are written as .csv, .parquet, .h5, .hdf5; the ending chooses",
+        ),
+        (["run", "weld.toml", "--plot", "out.gif"], "out.gif: pictures are written as .png, .svg; the ending chooses"),
+        (["run", "exchange.fmu"], "exchange.fmu: not an FMU for co-simulation by FMI 2.0"),
         (["build", "weld.toml", "-o", "no/weld.fmu"], "no/weld.fmu: folder no does not exist"),
         (["build", "weld.toml", "-o", "folder"], "folder: is a folder"),
         (["demo", "--scenes", "folder"], "folder: no scenes here; give the folder with --scenes"),
@@ -222,6 +237,12 @@ def test_wrong_files(weld, scene_file, capsys, tmp_path, arguments, line):
     (tmp_path / "text.fmu").write_text("no archive")
     with zipfile.ZipFile(tmp_path / "foreign.fmu", "w") as archive:
         archive.writestr("modelDescription.xml", "<fmiModelDescription/>")
+    with zipfile.ZipFile(tmp_path / "exchange.fmu", "w") as archive:
+        archive.writestr(
+            "modelDescription.xml",
+            '<fmiModelDescription fmiVersion="2.0" modelName="m" guid="1"><ModelExchange modelIdentifier="m"/>'
+            "<ModelVariables/><ModelStructure/></fmiModelDescription>",
+        )
     with zipfile.ZipFile(tmp_path / "list.fmu", "w") as archive:
         archive.writestr("resources/report.json", "[]")
     xml = package.contents(tiefmu.load(weld))["modelDescription.xml"]
@@ -333,16 +354,25 @@ def test_demo(free, tmp_path, capsys):
     assert rows(tmp_path / "out" / "free.csv")[1][-1, 0] == pytest.approx(0.5)
 
 
-def test_demo_reports_a_check_that_fails():
+def test_demo_says_in_words_what_it_checks():
     from tiefmu.demo import check
+    from tiefmu.results import Kept
 
-    good = np.array(
-        [(0.0, 1.0, 1e-15), (1.0, 2.0, 2e-15)], dtype=[("time", float), ("slave[1].v[1]", float), ("drift", float)]
-    )
-    assert all(one.held for one in check(good))
-    broken = good.copy()
-    broken["slave[1].v[1]"][1] = np.nan
-    assert [one.name for one in check(broken) if not one.held] == ["not finite"]
-    broken = good.copy()
-    broken["drift"][1] = 1e-3
-    assert [one.name for one in check(broken) if not one.held] == ["drift [m]"]
+    def said(rows):
+        names = ["slave[1].v[1]", "drift"]
+        kept = Kept(names, dict.fromkeys(names, "1"), len(rows))
+        kept.write(np.array(rows))
+        return list(map(str, check(kept.result(0.0))))
+
+    assert said([(0, 1, 1e-15), (1, 2, 2e-15)]) == ["finite values: yes", "offsets keep their length: yes (2.0e-15 m)"]
+    assert said([(0, 1, 1e-15), (1, np.nan, 2e-15)])[0] == "finite values: NO, FAILED"
+    assert said([(0, 1, 1e-15), (1, 1, 1e-3)])[1] == "offsets keep their length: NO, FAILED (1.0e-03 m)"
+
+
+def test_demo_fails_where_a_check_fails(free, tmp_path, capsys, monkeypatch):
+    from tiefmu import demo
+
+    (tmp_path / "free.toml").write_text(toml(free))
+    monkeypatch.setattr(demo, "check", lambda result: [demo.Check("finite values", False)])
+    assert main(["demo", "--scenes", str(tmp_path), "--out", str(tmp_path / "out")]) == 1
+    assert "A CHECK FAILED" in capsys.readouterr().out

@@ -9,8 +9,8 @@ import numpy as np
 
 from .arguments import check_folder_of, positive
 from .errors import Diverged, SceneError, UsageError
-from .run import inputs_beside
 from .scene_file import toml_text
+from .signals import inputs_beside
 from .study import reference
 from .study.driven import METHODS as SAMPLINGS
 from .study.driven import SAMPLES, DrivenRun, HeavyRun

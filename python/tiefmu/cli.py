@@ -1,10 +1,12 @@
 """The command line: build, info, run, demo, study, advise."""
 
 import argparse
+import contextlib
 import json
 import os
 import sys
 import tempfile
+from collections.abc import Iterator
 from pathlib import Path
 
 from . import __version__, advise, study
@@ -13,9 +15,10 @@ from .decks import command as import_command
 from .demo import SCENES, demo
 from .errors import RunError, SceneError, UsageError
 from .package import build
-from .plot import plot
+from .plot import check_picture, plot
 from .report import counted, of_fmu, report, summary, text
-from .run import run, write_outputs
+from .results import check_format
+from .run import run
 from .scene import load
 
 SHOWN = 20  # outputs that `run` prints
@@ -87,8 +90,13 @@ def parser() -> argparse.ArgumentParser:
         "--step", metavar="H", type=positive, help="communication step, s (default: the FMU's, but at least 500 steps)"
     )
     run.add_argument("--input", metavar="CSV", type=Path, help="inputs over time")
-    run.add_argument("--output", metavar="CSV", type=Path, help="file to write the outputs to")
-    run.add_argument("--plot", metavar="PNG", type=Path, help="file to draw the outputs to")
+    run.add_argument(
+        "--output",
+        metavar="FILE",
+        type=Path,
+        help="file to write the outputs to, row by row: .csv, .parquet or .h5 (for many variables)",
+    )
+    run.add_argument("--plot", metavar="PNG", type=Path, help="file to draw the outputs to, .png or .svg")
     run.set_defaults(command=run_run)
 
     demo = commands.add_parser(
@@ -136,31 +144,37 @@ def run_run(options: argparse.Namespace) -> None:
     files = [path for path in (options.output, options.plot) if path]
     for path in files:
         check_folder_of(path)
-    with tempfile.TemporaryDirectory(prefix="tiefmu-") as folder:
-        if is_fmu(options.model):
-            fmu = existing(options.model)
-        else:
-            scene = load(options.model)
-            fmu = build(scene, Path(folder) / f"{scene.name}.fmu")
-            show_warnings(options.model, report(scene))
-        result = run(fmu, options.stop_time, options.step, options.input, name=options.model)
     if options.output:
-        write_outputs(result, options.output)
+        check_format(options.output)
+    if options.plot:
+        check_picture(options.plot)
+    with fmu_of(options.model) as fmu:
+        result, found = run(fmu, options.stop_time, options.step, options.input, options.model, options.output)
     if options.plot:
         plot(result, options.plot, Path(options.model).stem)
-    outputs = result.dtype.names[1:]
     print(
-        f"{options.model}: {len(result) - 1} steps to t = {result['time'][-1]:g} s, {len(outputs)} outputs"
+        f"{options.model}: {result.steps} steps to t = {result.last[0]:g} s, {counted(len(result.names), 'output')}"
         + "".join(f", wrote {path}" for path in files)
     )
+    print(*found, sep="\n")
     if not files:
-        for name in outputs[:SHOWN]:
-            print(
-                f"  {name:<24} from {result[name].min():<12.6g} to {result[name].max():<12.6g} "
-                f"at the end {result[name][-1]:.6g}"
-            )
-        if len(outputs) > SHOWN:
-            print(f"  ... and {len(outputs) - SHOWN} more (--output writes all)")
+        for name, low, high, last in zip(result.names[:SHOWN], result.low[1:], result.high[1:], result.last[1:]):
+            print(f"  {name:<24} from {low:<12.6g} to {high:<12.6g} at the end {last:.6g}")
+        if len(result.names) > SHOWN:
+            print(f"  ... and {len(result.names) - SHOWN} more (--output writes all)")
+
+
+@contextlib.contextmanager
+def fmu_of(model: str) -> Iterator[Path]:
+    """The FMU, or that of the scene, whose warnings are shown; in a temporary folder."""
+    if is_fmu(model):
+        yield existing(model)
+        return
+    with tempfile.TemporaryDirectory(prefix="tiefmu-") as folder:
+        scene = load(model)
+        fmu = build(scene, Path(folder) / f"{scene.name}.fmu")
+        show_warnings(model, report(scene))
+        yield fmu
 
 
 def run_demo(options: argparse.Namespace) -> int:

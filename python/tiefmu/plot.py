@@ -2,32 +2,36 @@
 
 import re
 from pathlib import Path
-from typing import TYPE_CHECKING
-
-import numpy as np
 
 from . import figures
-
-if TYPE_CHECKING:
-    from fmpy.simulation import SimulationResult
+from .errors import UsageError
+from .results import Result
 
 LINES = 8  # most in a panel: those that move most
 PANELS = 8  # most in a picture, in this order
+PICTURES = (".png", ".svg")
 ORDER = ["port", "slave", "master", "point", "energy", "power_residual", "drift"]
 
 
-def plot(result: "SimulationResult", path: Path, title: str) -> None:
-    """Writes a PNG of what `run` returned. Raises OSError."""
-    units = {
-        variable.name: variable.unit or (variable.declaredType and variable.declaredType.unit)
-        for variable in result.modelDescription.modelVariables
-    }
-    panels = {}
-    for name in result.dtype.names:
+def check_picture(path: Path) -> None:
+    """Raises UsageError where the ending says no format."""
+    if path.suffix.lower() not in PICTURES:
+        raise UsageError(f"{path}: pictures are written as {', '.join(PICTURES)}; the ending chooses")
+
+
+def plot(result: Result, path: Path, title: str) -> None:
+    """Writes a picture of what `run` returned. Raises OSError."""
+    panels: dict[str, list[str]] = {}
+    for name in result.names:
         if re.split(r"[.\[]", name)[0] in ORDER:
             quantity = "energy" if name.startswith("energy.") else re.sub(r"\[[^]]*\]", "", name)
             panels.setdefault(quantity, []).append(name)
     shown = sorted(panels.items(), key=lambda panel: ORDER.index(panel[0].split(".")[0]))[:PANELS]
+    if len(panels) > PANELS:
+        title += f" ({PANELS} of {len(panels)} quantities)"
+    if result.every > 1:
+        title += f" (every {result.every}th row)"
+    moved = dict(zip(result.names, (result.high - result.low)[1:].tolist()))
     figure, axes = figures.pyplot().subplots(
         max(len(shown), 1),
         1,
@@ -37,10 +41,10 @@ def plot(result: "SimulationResult", path: Path, title: str) -> None:
         layout="constrained",
     )
     for axis, (quantity, names) in zip(axes[:, 0], shown):
-        names = sorted(names, key=lambda name: -np.ptp(result[name]))
+        names = sorted(names, key=lambda name: -moved[name])
         for name in names[:LINES]:
             axis.plot(result["time"], result[name], linewidth=1, label=name)
-        axis.set_ylabel(f"{quantity} [{units[names[0]]}]")
+        axis.set_ylabel(f"{quantity} [{result.units[names[0]]}]")
         axis.grid(alpha=0.3)
         axis.legend(
             fontsize="x-small",

@@ -216,6 +216,15 @@ def of_fmu(path: Path) -> dict:
     return found
 
 
+def of_folder(folder: Path) -> dict | None:
+    """The report of an unpacked FMU; None if it is none of ours."""
+    try:
+        found = json.loads((folder / "resources" / "report.json").read_bytes())
+    except (OSError, ValueError):
+        return None
+    return found if isinstance(found, dict) and "integrator_limit" in found else None
+
+
 # ------------------------------------------------------------------------------------------------------------- as text
 
 

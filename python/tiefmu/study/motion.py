@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..run import read_inputs
 from ..scene import Scene
+from ..signals import read_inputs
 
 REPEATS = 3
 SHORTEST = 0.005  # s of CPU time that one measurement takes at least
@@ -71,7 +71,7 @@ class Signals:
                 inputs[name] = (node, short.removesuffix("_ext"), k % components)
         table = read_inputs(path, _Description(known))
         values = {}
-        for name in table.dtype.names[1:]:
+        for name in (table.dtype.names or ())[1:]:
             node, quantity, k = inputs[name]
             if quantity in ("f", "t", "v", "w"):  # accelerations are taken as the slopes of the velocities
                 values.setdefault((node, quantity), np.zeros((len(table), 3)))[:, k] = table[name]
@@ -100,6 +100,8 @@ class Signals:
 class _Variable:
     name: str
     causality: str
+    type: str = "Real"
+    variability: str = "continuous"
 
 
 @dataclass

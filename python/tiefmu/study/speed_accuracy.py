@@ -8,7 +8,7 @@ import platform
 from dataclasses import astuple, fields
 from pathlib import Path
 
-from ..run import inputs_beside
+from ..signals import inputs_beside
 from .motion import Signals
 from .speed_accuracy_charts import write_page
 from .speed_accuracy_runs import STEPS, DrivenStudy, FreeStudy, Row

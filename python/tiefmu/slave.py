@@ -1,0 +1,204 @@
+"""An FMU on FMPy's FMU2Slave: one call for all inputs, one step, one call for all outputs, on preallocated arrays."""
+
+import contextlib
+import ctypes
+import io
+import itertools
+import tempfile
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .errors import RunError
+from .signals import Experiment, one_line
+
+LARGEST_BLOCK = 2**26  # bytes of rows handed on at a time
+INPUTS_AHEAD = 2**22  # bytes of inputs computed at a time
+
+
+class Fmu:
+    """An FMI 2.0 co-simulation FMU, described and unpacked; a context manager that removes what it unpacked.
+
+    description: FMPy's; name: how messages call it.
+    """
+
+    def __init__(self, path: Path, name: str | None = None):
+        """Raises RunError where it cannot be read."""
+        import fmpy  # here, because importing it takes half a second
+
+        self.path, self.name = path, name or str(path)
+        try:
+            self.description = fmpy.read_model_description(str(path), validate=False)
+        except Exception as error:
+            raise RunError(f"{self.name}: not an FMU that FMPy can read: {one_line(error)}") from None
+        if self.description.fmiVersion != "2.0" or self.description.coSimulation is None:
+            raise RunError(f"{self.name}: not an FMU for co-simulation by FMI 2.0")
+        self.variables = {variable.name: variable for variable in self.description.modelVariables}
+        self._folder: tempfile.TemporaryDirectory | None = None
+
+    def __enter__(self) -> "Fmu":
+        import fmpy
+
+        self._folder = tempfile.TemporaryDirectory(prefix="tiefmu-")
+        try:
+            fmpy.extract(str(self.path), self._folder.name)
+        except Exception as error:
+            self.__exit__()
+            raise RunError(f"{self.name}: cannot be unpacked: {one_line(error)}") from None
+        return self
+
+    def __exit__(self, *_) -> None:
+        if self._folder:
+            self._folder.cleanup()
+            self._folder = None
+
+    @property
+    def folder(self) -> Path:
+        """Where it is unpacked."""
+        assert self._folder, "inside `with`"
+        return Path(self._folder.name)
+
+    def outputs(self) -> list[str]:
+        """Names of the Real outputs, in the order of the description."""
+        return [v.name for v in self.description.modelVariables if v.causality == "output" and v.type == "Real"]
+
+    def unit(self, name: str) -> str:
+        variable = self.variables[name]
+        return variable.unit or (variable.declaredType and variable.declaredType.unit) or "1"
+
+    def experiment(self, key: str, default):
+        """startTime, stopTime, stepSize or tolerance of the default experiment."""
+        value = getattr(self.description.defaultExperiment, key, None)
+        return default if value is None else float(value)
+
+
+class Slave:
+    """An instance. Outputs: names of Real variables."""
+
+    def __init__(self, fmu: Fmu, outputs: list[str]):
+        """Raises RunError where it cannot be instantiated."""
+        import fmpy.fmi2
+        from fmpy.simulation import instantiate_fmu
+
+        self.fmu, self.said = fmu, []
+        self.references = references([fmu.variables[name].valueReference for name in outputs])
+
+        def log(environment, instance, status, category, message):
+            if status >= fmpy.fmi2.fmi2Error:
+                self.said.append(message.decode(errors="replace") if isinstance(message, bytes) else str(message))
+
+        with self._errors("cannot be instantiated"), contextlib.redirect_stdout(io.StringIO()):
+            self.instance = instantiate_fmu(
+                str(fmu.folder), fmu.description, "CoSimulation", logger=log, require_functions=False
+            )
+
+    @contextlib.contextmanager
+    def _errors(self, what: str):
+        try:
+            yield
+        except Exception as error:
+            message = one_line(self.said[-1] if self.said else error)
+            self.said.clear()
+            raise RunError(f"{self.fmu.name}: {what}: {message}") from None
+
+    def reset(self) -> None:
+        """Back to where it was after its instantiation."""
+        with self._errors("cannot be reset"):
+            self.instance.reset()
+
+    def free(self) -> None:
+        self.instance.freeInstance()
+
+    def read(self, names: list[str]) -> list[float]:
+        """Values of Real variables."""
+        with self._errors("cannot be read"):
+            return self.instance.getReal([self.fmu.variables[name].valueReference for name in names])
+
+    def blocks(
+        self,
+        plan: Experiment,
+        start_values: dict[str, float] | None = None,
+        finished: Callable[[float], Any] | None = None,
+        largest: int = LARGEST_BLOCK,
+    ) -> Iterator[np.ndarray]:
+        """Runs it. Yields rows of time and outputs (rows, 1 + outputs), at the start and after each step, in blocks of
+        at most `largest` bytes. finished(time) after each step. Row k holds what the FMU answers at the end of step k,
+        the inputs being those of the start of the step. Raises RunError."""
+        inputs, time = plan.inputs, plan.start
+        points = plan.points(self.fmu.description.coSimulation.canHandleVariableCommunicationStepSize)
+        estimate = int(min(plan.rows, 1e15)) + 3
+        width = 8 * (1 + len(self.references))
+        block = np.empty((max(2, min(estimate, largest // width)), 1 + len(self.references)))
+        given = np.empty((0, 0))
+        slave, component = self.instance, self.instance.component
+        set_real, do_step, get_real = slave.fmi2SetReal, slave.fmi2DoStep, slave.fmi2GetReal
+        outputs, n_outputs = self.references, len(self.references)
+        controls, n_controls = references(inputs.references), len(inputs.references)
+        value, value_at = moving_pointer()
+        control, control_at = moving_pointer()
+
+        ahead = max(1, INPUTS_AHEAD // (8 * max(n_controls, 1)))
+        block[0, 0] = time
+        value_at.value = block.ctypes.data + 8
+        with self._errors(f"stopped at t = {time:g} s"):
+            self._initialise(plan, start_values or {})
+            get_real(component, outputs, n_outputs, value)
+        row = 1
+        while True:
+            ends = np.fromiter(itertools.islice(points, min(len(block) - row, ahead)), float)
+            if not len(ends):
+                break
+            if n_controls:
+                given = inputs.at(np.append(time, ends[:-1]))
+            control_at.value = given.ctypes.data
+            block[row : row + len(ends), 0] = ends
+            value_at.value = block[row:].ctypes.data + 8
+            try:
+                for end in ends.tolist():
+                    if n_controls:
+                        set_real(component, controls, n_controls, control)
+                        control_at.value += 8 * n_controls
+                    do_step(component, time, end - time, 1)
+                    get_real(component, outputs, n_outputs, value)
+                    value_at.value += width
+                    time = end
+                    if finished:
+                        finished(time)
+            except Exception:
+                with self._errors(f"stopped at t = {time:g} s"):
+                    raise
+            row += len(ends)
+            if row == len(block):
+                yield block
+                block, row = np.empty_like(block), 0
+        if row:
+            yield block[:row]
+        with self._errors("cannot be terminated"):
+            slave.terminate()
+
+    def _initialise(self, plan: Experiment, start_values: dict[str, float]) -> None:
+        """As `simulate_fmu` does it: start values, then inputs, in initialization mode."""
+        slave = self.instance
+        slave.setupExperiment(
+            tolerance=self.fmu.experiment("tolerance", None), startTime=plan.start, stopTime=plan.stop
+        )
+        slave.enterInitializationMode()
+        if start_values:
+            slave.setReal(
+                [self.fmu.variables[name].valueReference for name in start_values], list(start_values.values())
+            )
+        if plan.inputs.references:
+            slave.setReal(plan.inputs.references, plan.inputs.at(np.array([plan.start]), after_jump=False)[0])
+        slave.exitInitializationMode()
+
+
+def references(values: list[int]) -> Any:
+    return (ctypes.c_uint32 * len(values))(*values)
+
+
+def moving_pointer() -> tuple[Any, ctypes.c_size_t]:
+    """A pointer to doubles, and its address as a number that can be set: no object is made in a step."""
+    pointer = ctypes.POINTER(ctypes.c_double)()
+    return pointer, ctypes.c_size_t.from_buffer(pointer)
