@@ -1,20 +1,20 @@
 """Finite-element decks as scenes: `tiefmu import DECK`, and decks where scenes are asked for.
 
-A reader of a language (radioss/) fills a Deck (model.py); element_properties.py gives its nodes masses, inertias and
-stiffnesses; to_scene.py makes the scene of its ties; write.py puts it into files.
+A reader of a language (radioss/, abaqus/) fills a Deck (model.py); element_properties.py gives its nodes masses,
+inertias and stiffnesses; to_scene.py makes the scene of its ties; settle.py looks at pairs of slave and segment;
+write.py puts it into files.
 """
 
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
 from .._core import SceneError
-from . import radioss, to_scene, write
+from . import abaqus, radioss, to_scene, write
 from .model import Deck
+from .settle import settle
 
-LANGUAGES = (radioss,)
+LANGUAGES = (radioss, abaqus)
 HEAD = 4096  # bytes by which a language is told
 NOT_DECKS = (".toml", ".fmu", ".json", ".csv")
 
@@ -54,7 +54,7 @@ def read(path: Path, ties: list[str] | None = None, free: tuple[str, ...] = ()) 
     deck = reader.read(path, str(path), ties)
     found = Imported(deck, to_scene.convert(deck, free))
     if found.scene.pairwise:
-        drop_far_pairs(found)
+        settle(deck, found.scene, compiled(found))
     return found
 
 
@@ -78,43 +78,6 @@ def compiled(found: Imported):
     scene.notes += [line.removeprefix(prefix) for line in write.remarks(found.deck)]
     scene.warnings += [line.removeprefix(prefix) for line in found.deck.warnings]
     return scene
-
-
-def drop_far_pairs(found: Imported):
-    """Takes slaves out of ties with a tolerance per pair where the segment they find is farther than it."""
-    from ..report import report
-
-    waiting = dict(found.scene.pairwise)
-    rows = report(compiled(found))["slaves"]
-    for name, pair in waiting.items():
-        mine = [row for row in rows if row["tie"] == name]
-        ids, segments = (np.array([row[key] for row in mine], np.int64) for key in ("id", "segment"))
-        distance = np.array([row["distance"] for row in mine])
-        limit = pair_limit(pair, ids, segments) * pair["factor"]
-        far = np.flatnonzero(distance > limit * (1 + 1e-12))
-        table = next(table for table in found.scene.tables["tie"] if table["name"] == name)
-        kept = np.setdiff1d(ids, ids[far])
-        lost = np.setdiff1d(found.scene.node_sets[table["slaves"]], kept)
-        if len(lost):
-            found.deck.warn(
-                f"tie '{name}': {len(lost)} slaves, the first is node {lost[0]}, are farther from the surface than "
-                "their tolerance and are dropped"
-            )
-        if not len(kept):
-            raise SceneError(f"{found.deck.file}: tie '{name}': no slave is within its tolerance of the surface")
-        found.scene.node_sets[table["slaves"]] = kept
-    found.scene.pairwise = {}
-
-
-def pair_limit(pair: dict, slaves: np.ndarray, segments: np.ndarray) -> np.ndarray:
-    """Tolerance of each pair of slave id and segment id, in the deck's units."""
-
-    def place(known, wanted):
-        order = np.argsort(known, kind="stable")
-        return order[np.searchsorted(known, wanted, sorter=order)]
-
-    face, node = place(pair["segment"], segments), place(pair["slave"], slaves)
-    return np.maximum(pair["diagonal"][face], pair["share"] * (pair["t_s"][node] + pair["t_m"][face]))
 
 
 def import_deck(deck: Path, scene: Path, ties: list[str] | None = None, free: tuple[str, ...] = ()) -> Imported:

@@ -10,7 +10,8 @@ shell: thickness, formulation (q4, qbat, qeph), triangle (c0, dkt18), dm, dn, of
 solid: qb (linear bulk viscosity), rotary (true: nodes rotate), tetra10 (0, 2: time step of a tetra4)
 truss, beam: area; beam: iyy, izz, ixx, dm, df
 spring: mass, inertia, per_length, and vectors of three: stiffness, damping, rotational_stiffness,
-rotational_damping; type: axial (only the first counts), general, beam (shear turns its ends)
+rotational_damping; type: axial (only the first counts), general, beam (shear turns its ends); turning: false where a
+general one has no rotations
 """
 
 from collections.abc import Callable
@@ -19,7 +20,18 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from .._core import SceneError
-from .model import Deck, Elements
+from . import lumping, second_order
+from .element_lengths import (
+    damping_factor,
+    hex_length,
+    hex_volume,
+    need_solid,
+    shell_area,
+    shell_thickness,
+    solid_step,
+    tetra_length,
+)
+from .model import SHELLS, Deck, Elements
 
 
 @dataclass
@@ -75,7 +87,7 @@ def nodal(deck: Deck, in_scene: np.ndarray | None = None) -> Nodal:
         function = FUNCTIONS[kind]
         for part, prop, material, members in deck.part_values(elements.part):
             some = Elements(kind, *(getattr(elements, key)[members] for key in ("id", "nodes", "part", "thickness")))
-            where = f"{part.where or deck.file}: part {part.id}"
+            where = f"{part.where or deck.file}: {part.name}"
             found.where, found.element = where, some.id
             with np.errstate(all="ignore"):
                 if kind == "spring":
@@ -91,20 +103,8 @@ def nodal(deck: Deck, in_scene: np.ndarray | None = None) -> Nodal:
     return found
 
 
-def damping_factor(prop, material, least: float = 0.0) -> float:
-    """v of shells: cdleni.F, cndleni.F, c3derii.F."""
-    dm = 0.0 if material.undamped else prop.values.get("dm", 0.0) or material.damping
-    d = max(dm, least)
-    return np.sqrt(1 + d * d) - d
-
-
-def shell_area(x: np.ndarray) -> np.ndarray:
-    """x (n, 4, 3): half the cross product of the diagonals."""
-    return 0.5 * np.linalg.norm(np.cross(x[:, 2] - x[:, 0], x[:, 3] - x[:, 1]), axis=1)
-
-
 def shell4(found: Nodal, deck: Deck, some: Elements, part, prop, material, where: str):
-    """Four-node shells: cinmas.F; cdleni.F (Q4), cndleni.F (QBAT, QEPH)."""
+    """Four-node shells: cinmas.F; cdleni.F (Q4), cndleni.F (QBAT, QEPH). Membranes the same without rotations."""
     nodes = np.where(some.nodes < 0, some.nodes[:, [2]], some.nodes)
     x = deck.position[nodes]
     t = shell_thickness(some, part, prop)
@@ -115,21 +115,25 @@ def shell4(found: Nodal, deck: Deck, some: Elements, part, prop, material, where
     full = formulation != "q4"
     mass = material.density * t * area / 4
     z0 = prop.values.get("offset", 0.0)
-    inertia = mass * (area / (12 if full else 9) + t * t * (1 / 12 + z0 * z0))
-    found.add(nodes, mass, inertia)
+    gyration = area / (12 if full else 9) + t * t * (1 / 12 + z0 * z0)
+    if deck.shape_lumping:
+        mass, gyration = mass[:, None] * (4 * lumping.quad_shares(x)), gyration[:, None]
+    turning = some.kind in SHELLS
+    found.add(nodes, mass, mass * gyration if turning else 0.0)
     if prop.kind != "void" and not material.void:
-        found.rotations[nodes] = True
+        if turning:
+            found.rotations[nodes] = True
         a11 = material.young / (1 - material.poisson**2)
         if not full:
             v = damping_factor(prop, material)
             d13, d24 = (((x[:, i] - x[:, i + 2]) ** 2).sum(axis=1) for i in (0, 1))
             k = np.maximum(d13, d24) / 4 * t * a11 / (area * v * v)
-            found.add(nodes, stiffness=k, rotational_stiffness=k * (t * t + area) / 12)
+            found.add(nodes, stiffness=k, rotational_stiffness=k * (t * t + area) / 12 if turning else 0.0)
         else:
             v = damping_factor(prop, material, prop.values.get("dn", 0.0))
             length = full_shell_length(x, area, formulation)
             k = 0.5 * t * area * a11 / (v * length) ** 2
-            found.add(nodes, stiffness=k, rotational_stiffness=k * t * t / 12)
+            found.add(nodes, stiffness=k, rotational_stiffness=k * t * t / 12 if turning else 0.0)
 
 
 def full_shell_length(x: np.ndarray, area: np.ndarray, formulation: str) -> np.ndarray:
@@ -148,13 +152,8 @@ def full_shell_length(x: np.ndarray, area: np.ndarray, formulation: str) -> np.n
     return area / np.sqrt(2 * f1 * f2 * ((4 / 3 if formulation == "qbat" else 5 / 4) + al2) * al1)
 
 
-def shell_thickness(some: Elements, part, prop) -> np.ndarray:
-    own = part.thickness or (prop.values.get("thickness", 0.0) if prop else 0.0)
-    return np.where(some.thickness > 0, some.thickness, own)
-
-
 def shell3(found: Nodal, deck: Deck, some: Elements, part, prop, material, where: str):
-    """Three-node shells: c3inmas.F; c3derii.F (C0), cdkderii.F (DKT18)."""
+    """Three-node shells: c3inmas.F; c3derii.F (C0), cdkderii.F (DKT18). Membranes the same without rotations."""
     if material is None or prop is None:
         raise SceneError(f"{where}: its shells need a property and a material")
     x = deck.position[some.nodes]
@@ -165,13 +164,17 @@ def shell3(found: Nodal, deck: Deck, some: Elements, part, prop, material, where
     cosines = np.stack([(b * b + c * c - a * a) / (2 * b * c), (a * a + c * c - b * b) / (2 * a * c)], axis=1)
     share = np.arccos(np.clip(cosines, -1, 1)) / np.pi
     share = np.concatenate([share, np.maximum(1 - share.sum(axis=1, keepdims=True), 0)], axis=1)
+    if deck.shape_lumping:
+        share = np.full(share.shape, 1 / 3)
+    turning = some.kind in SHELLS
     mass = material.density * t * area
     z0 = prop.values.get("offset", 0.0)
     inertia = mass * (area / 4.5 + t * t * (1 / 12 + z0 * z0))
-    found.add(some.nodes, mass[:, None] * share, inertia[:, None] * share)
+    found.add(some.nodes, mass[:, None] * share, inertia[:, None] * share if turning else 0.0)
     if prop.kind == "void" or material.void:
         return
-    found.rotations[some.nodes] = True
+    if turning:
+        found.rotations[some.nodes] = True
     v = damping_factor(prop, material)
     a11 = material.young / (1 - material.poisson**2)
     longest = side.max(axis=1) ** 2
@@ -183,18 +186,7 @@ def shell3(found: Nodal, deck: Deck, some: Elements, part, prop, material, where
         k = t * area * a11 * longest / (2 * area * v) ** 2
         g = material.young / (2 * (1 + material.poisson))
         kr = k * (t * t / 12 + area * g / (2 * a11))
-    found.add(some.nodes, stiffness=k, rotational_stiffness=kr)
-
-
-HEX_FACES = [[0, 1, 2, 3], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]]
-
-
-def hex_volume(x: np.ndarray) -> np.ndarray:
-    """x (n, 8, 3): eight times the Jacobian at the centre, as the one-point brick takes it: sderi3.F."""
-    r = x[:, [1, 2, 5, 6]].sum(axis=1) - x[:, [0, 3, 4, 7]].sum(axis=1)
-    s = x[:, [2, 3, 6, 7]].sum(axis=1) - x[:, [0, 1, 4, 5]].sum(axis=1)
-    q = x[:, [4, 5, 6, 7]].sum(axis=1) - x[:, [0, 1, 2, 3]].sum(axis=1)
-    return np.abs((np.cross(r, s) * q).sum(axis=1)) / 64
+    found.add(some.nodes, stiffness=k, rotational_stiffness=kr if turning else 0.0)
 
 
 def brick(found: Nodal, deck: Deck, some: Elements, part, prop, material, where: str):
@@ -204,41 +196,17 @@ def brick(found: Nodal, deck: Deck, some: Elements, part, prop, material, where:
     x = deck.position[nodes]
     volume = hex_volume(x)
     mass = material.density * volume / 8
+    if deck.shape_lumping:
+        exact, shares = lumping.hex_shares(x)
+        mass = material.density * exact[:, None] * shares
     rotary = bool(prop.values.get("rotary"))
     found.add(nodes, mass, mass * volume ** (2 / 3) / 6 if rotary else 0.0)
     if rotary:
         found.rotations[nodes] = True
     if prop.kind == "void" or material.void or not material.density:
         return
-    largest = np.zeros(len(x))
-    for face in HEX_FACES:
-        a, b, c, d = (x[:, i] for i in face)
-        r, s = b + c - a - d, c + d - a - b
-        e, f, g = (r * r).sum(axis=1), (r * s).sum(axis=1), (s * s).sum(axis=1)
-        largest = np.maximum(largest, e * g - f * f)
-    step = solid_step(4 * volume / np.sqrt(largest), prop, material)
+    step = solid_step(hex_length(x, volume), prop, material)
     found.add(nodes, stiffness=material.density * volume / (4 * step * step))
-
-
-def need_solid(prop, material, where: str):
-    if material is None or prop is None:
-        raise SceneError(f"{where}: its solids need a property and a material")
-
-
-def solid_step(length: np.ndarray, prop, material) -> np.ndarray:
-    """dt = L / (Q + sqrt(Q^2 + c^2)), Q = qb c, c^2 = (K + 4 G / 3) / rho: dtel.F."""
-    nu = min(material.poisson, 0.499999)
-    c = np.sqrt(material.young * (1 - nu) / ((1 + nu) * (1 - 2 * nu)) / material.density)
-    q = prop.values.get("qb", 0.05) * c
-    return length / (q + np.sqrt(q * q + c * c))
-
-
-def tetra_length(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Volume, and 1 / the largest norm of the shape functions' gradients: s4deri3.F. x (n, 4, 3)."""
-    volume = np.abs((np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]) * (x[:, 3] - x[:, 0])).sum(axis=1)) / 6
-    faces = [[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]]
-    areas = [0.5 * np.linalg.norm(np.cross(x[:, b] - x[:, a], x[:, c] - x[:, a]), axis=1) for a, b, c in faces]
-    return volume, 3 * volume / np.max(areas, axis=0)
 
 
 def tetra4(found: Nodal, deck: Deck, some: Elements, part, prop, material, where: str):
@@ -256,6 +224,9 @@ def tetra10(found: Nodal, deck: Deck, some: Elements, part, prop, material, wher
     its share to its corners. The stiffness keeps the step of the tetrahedron of its corners, halved: the step of a
     quadratic edge."""
     need_solid(prop, material, where)
+    if deck.shape_lumping and (some.nodes >= 0).all():
+        second_order.curved_solid(found, deck, some, part, prop, material, where)
+        return
     corners, middle = some.nodes[:, :4], some.nodes[:, 4:]
     volume, length = tetra_length(deck.position[corners])
     mass = material.density * volume
@@ -289,7 +260,11 @@ def beam(found: Nodal, deck: Deck, some: Elements, part, prop, material, where: 
         raise SceneError(f"{where}: its beams need a property and a material")
     values = prop.values
     length = np.linalg.norm(deck.position[some.nodes[:, 1]] - deck.position[some.nodes[:, 0]], axis=1)
-    area, ixx, bending = values.get("area", 0.0), values.get("ixx", 0.0), max(values["iyy"], values["izz"], 1e-30)
+    area = values.get("area", 0.0)
+    if not material.young or not area:
+        found.add(some.nodes, material.density * length * area / 2)
+        return
+    ixx, bending = values.get("ixx", 0.0), max(values["iyy"], values["izz"], 1e-30)
     young, g = material.young, material.young / (2 * (1 + material.poisson))
     slenderness = area * length**2 / bending / 12
     shear = 1.2 * young / g / slenderness
@@ -309,14 +284,15 @@ def spring(found: Nodal, deck: Deck, some: Elements, prop, in_scene: np.ndarray)
     if prop is None or prop.kind != "spring":
         return
     values = prop.values
-    length = np.linalg.norm(deck.position[some.nodes[:, 1]] - deck.position[some.nodes[:, 0]], axis=1)
+    end = np.where(some.nodes[:, 1] < 0, some.nodes[:, 0], some.nodes[:, 1])
+    length = np.linalg.norm(deck.position[end] - deck.position[some.nodes[:, 0]], axis=1)
     scale = length if values.get("per_length") else np.ones(len(length))
     mass, inertia = values["mass"] * scale, values["inertia"] * scale
-    turning = values["type"] != "axial"
+    turning = values["type"] != "axial" and values.get("turning", True)
     found.add(some.nodes, mass / 2, inertia / 2 if turning else 0.0)
     if turning:
-        found.rotations[some.nodes] = True
-    axes = 3 if turning else 1
+        found.rotations[some.nodes[some.nodes >= 0]] = True
+    axes = 1 if values["type"] == "axial" else 3
     k, c = (max(values[key][:axes]) / scale for key in ("stiffness", "damping"))
     kr = cr = np.zeros(len(length))
     if turning:
@@ -345,4 +321,7 @@ FUNCTIONS: dict[str, Callable[..., None]] = {
     "truss": truss,
     "beam": beam,
     "spring": spring,
+    "membrane4": shell4,
+    "membrane3": shell3,
+    **second_order.FUNCTIONS,
 }

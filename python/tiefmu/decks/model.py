@@ -11,10 +11,16 @@ import numpy as np
 
 from .._core import SceneError
 
-# Nodes of one element. A shell4 or hex8 may repeat a node (a triangle, a wedge); a mid-side node of a tet10 may be -1.
-KINDS = {"shell4": 4, "shell3": 3, "hex8": 8, "wedge6": 6, "tet4": 4, "tet10": 10, "spring": 2, "truss": 2, "beam": 2}
+# Nodes of one element: corners, then mid-side nodes. A shell4 or hex8 may repeat a node (a triangle, a wedge); a
+# mid-side node of a tet10 may be -1, and so may the second node of a spring, which then ends at the ground.
+KINDS = {
+    "shell4": 4, "shell3": 3, "hex8": 8, "wedge6": 6, "tet4": 4, "tet10": 10, "spring": 2, "truss": 2, "beam": 2,
+    "membrane4": 4, "membrane3": 3, "shell8": 8, "shell9": 9, "shell6": 6, "membrane8": 8, "membrane9": 9,
+    "membrane6": 6, "hex20": 20, "wedge15": 15,
+}  # fmt: skip
 SHELLS = ("shell4", "shell3")
 SOLIDS = ("hex8", "wedge6", "tet4", "tet10")
+TURNING = (*SHELLS, "shell8", "shell9", "shell6", "beam")  # elements whose nodes rotate
 
 
 @dataclass
@@ -30,7 +36,7 @@ class Elements:
 
 @dataclass
 class Part:
-    """property, material: ids, or 0; thickness: 0 where the property has it."""
+    """property, material: ids, or 0; thickness: 0 where the property has it; name: how messages call it."""
 
     id: int
     title: str = ""
@@ -38,6 +44,10 @@ class Part:
     material: int = 0
     thickness: float = 0.0
     where: str = ""
+    name: str = ""
+
+    def __post_init__(self):
+        self.name = self.name or f"part {self.id}"
 
 
 @dataclass
@@ -99,8 +109,9 @@ class Faces:
 @dataclass
 class Tie:
     """A tied interface. slaves: node indices; search_distance: None, the default of the language; pairwise: None, or
-    (shares of the shorter diagonal and of the summed thicknesses): what is farther than the larger one is dropped.
-    hand_on_rotations: false where slaves pass no moment on."""
+    (shares of the shorter diagonal and of the summed thicknesses): what is farther than the larger one, plus the
+    length pairwise_more, is dropped. thick_slaves: whether the slaves' thickness counts there. adjust: slaves are
+    moved to the surface, thickness counted as in pairwise. hand_on_rotations: false where slaves pass no moment on."""
 
     name: str
     slaves: np.ndarray
@@ -110,6 +121,9 @@ class Tie:
     search_distance: float | None = None
     unresolved: str = "error"
     pairwise: tuple[float, float] | None = None
+    pairwise_more: float = 0.0
+    thick_slaves: bool = True
+    adjust: bool = False
     hand_on_rotations: bool = True
     where: str = ""
 
@@ -146,7 +160,8 @@ class Deck:
 
     imposed: nodes whose motion the deck prescribes. frames: axes (3, 3, as rows) that springs name by id. lookup(name):
     nodes of a part or set, None where there is none. notes: what was decided and why; warnings: what the user should
-    look at; ignored: keywords left aside, keyword -> [why, how often].
+    look at; ignored: keywords left aside, keyword -> [why, how often]. shape_lumping: masses of first-order elements by
+    the integrals of their shape functions.
     """
 
     file: str
@@ -171,6 +186,7 @@ class Deck:
     warnings: list[str] = field(default_factory=list)
     ignored: dict[str, list] = field(default_factory=dict)
     frames: dict[int, np.ndarray] = field(default_factory=dict)
+    shape_lumping: bool = False
     lookup: Callable[[str], np.ndarray | None] = lambda name: None
 
     def nodes(self, ids, where: str) -> np.ndarray:

@@ -23,7 +23,8 @@ def spring_tables(deck: Deck, slave: np.ndarray, tied: np.ndarray, loose: np.nda
     for _, prop, _, members in deck.part_values(springs.part):
         if prop is None:
             continue
-        some = members[active[springs.nodes[members]].any(axis=1)]
+        both = springs.nodes[members]
+        some = members[(active[both] & (both >= 0)).any(axis=1)]
         if not len(some):
             continue
         if prop.kind != "spring":
@@ -34,8 +35,13 @@ def spring_tables(deck: Deck, slave: np.ndarray, tied: np.ndarray, loose: np.nda
         for index in some:
             a, b = springs.nodes[index]
             found = tables_of(deck, prop, a, b, springs.id[index])
-            tables += [{"nodes": [int(deck.node_id[a]), int(deck.node_id[b])]} | table for table in found]
-            ends += [a, b]
+            place = (
+                {"nodes": [int(deck.node_id[a]), int(deck.node_id[b])]}
+                if b >= 0
+                else {"ground": [int(deck.node_id[a])]}
+            )
+            tables += [place | table for table in found]
+            ends += [a, b] if b >= 0 else [a]
         held[some] = True
     for where, (count, function) in nonlinear.items():
         deck.warn(f"{where}: {count} springs follow function {function}; only their linear part is taken")
@@ -45,9 +51,9 @@ def spring_tables(deck: Deck, slave: np.ndarray, tied: np.ndarray, loose: np.nda
 
 
 def tables_of(deck: Deck, prop, a: int, b: int, number: int) -> list[dict]:
-    """One or two tables for a spring between the nodes a and b."""
+    """One or two tables for a spring between the nodes a and b, or a and the ground where b is -1."""
     values = prop.values
-    axis = deck.position[b] - deck.position[a]
+    axis = deck.position[b] - deck.position[a] if b >= 0 else np.zeros(3)
     length = float(np.linalg.norm(axis))
     scale = length if values.get("per_length") else 1.0
     k, c, kr, cr = (

@@ -14,7 +14,7 @@ import numpy as np
 from .._core import SceneError
 from ..units import DIMENSIONS, LENGTHS, MASSES, TIMES
 from .element_properties import Nodal, nodal
-from .model import Deck, Faces, Tie
+from .model import TURNING, Deck, Faces, Tie
 from .springs import spring_tables
 from .surfaces import match_rows
 
@@ -23,7 +23,8 @@ from .surfaces import match_rows
 class Written:
     """A scene in three parts. tables: as in the TOML file, without what the two files hold; the mesh (positions in
     the scene's units, segments as node ids with 0 for a triangle's fourth, sets of ids); columns of node properties.
-    pairwise: ties whose slaves still have to be compared with the tolerance of the segment that they find."""
+    pairwise: ties whose slaves still have to be compared with the tolerance of the segment that they find; unit: of
+    lengths, in m."""
 
     tables: dict
     node_id: np.ndarray
@@ -34,6 +35,7 @@ class Written:
     segment_sets: dict[str, np.ndarray] = field(default_factory=dict)
     columns: dict[str, np.ndarray] = field(default_factory=dict)
     pairwise: dict[str, dict] = field(default_factory=dict)
+    unit: float = 1.0
 
 
 def convert(deck: Deck, free: tuple[str, ...] = ()) -> Written:
@@ -61,6 +63,7 @@ def convert(deck: Deck, free: tuple[str, ...] = ()) -> Written:
         scale.of("position", deck.position[chosen]),
         *segments_of(deck),
     )
+    written.unit = scale.factors[0] if scale.names else 1.0
     written.columns = columns(deck, values, chosen, slave, loose, held, scale)
     written.tables["tie"] = [tie_table(deck, tie, written, scale) for tie in deck.ties]
     if springs:
@@ -197,12 +200,16 @@ def rotating_nodes(deck: Deck) -> np.ndarray:
     """Nodes of shells, beams and springs that transmit moments."""
     mask = np.zeros(len(deck.node_id), bool)
     for kind, elements in deck.elements.items():
-        if kind in ("shell4", "shell3", "beam"):
+        if kind in TURNING:
             mask[elements.nodes[elements.nodes >= 0]] = True
         if kind == "spring":
             for _, prop, _, members in deck.part_values(elements.part):
-                if prop is not None and prop.values.get("type", "axial") != "axial":
-                    mask[elements.nodes[members]] = True
+                if (
+                    prop is not None
+                    and prop.values.get("type", "axial") != "axial"
+                    and prop.values.get("turning", True)
+                ):
+                    mask[elements.nodes[members][elements.nodes[members] >= 0]] = True
     return mask
 
 
@@ -283,13 +290,14 @@ def tie_table(deck: Deck, tie: Tie, written: Written, scale: Scale) -> dict:
         table["search_distance"] = scale.number("search_distance", tie.search_distance)
     if tie.pairwise is not None:
         tolerance = pair_tolerance(deck, tie, tie.pairwise[0])
-        largest = np.maximum(
+        largest = tie.pairwise_more + np.maximum(
             tolerance["diagonal"].max(), tie.pairwise[1] * (tolerance["t_s"].max() + tolerance["t_m"].max())
         )
         table["search_distance"] = scale.number("search_distance", float(largest))
         tolerance["segment"] = written.segment_id[place]
         tolerance["factor"] = float(scale.factors[0])
-        tolerance["share"] = tie.pairwise[1]
+        tolerance["share"], tolerance["more"] = tie.pairwise[1], tie.pairwise_more
+        tolerance["adjust"] = tie.adjust
         written.pairwise[tie.name] = tolerance
     return table
 
@@ -301,9 +309,8 @@ def pair_tolerance(deck: Deck, tie: Tie, share: float) -> dict:
     x = deck.position[four]
     diagonals = np.stack([np.linalg.norm(x[:, i] - x[:, i + 2], axis=1) for i in (0, 1)])
     thick = np.zeros(len(deck.node_id))
-    for kind in ("shell4", "shell3"):
-        elements = deck.elements.get(kind)
-        if elements is not None:
+    for kind, elements in deck.elements.items() if tie.thick_slaves else ():
+        if kind in TURNING and kind != "beam":
             t = np.repeat(deck.thickness(elements), elements.nodes.shape[1])
             nodes = elements.nodes.ravel()
             np.maximum.at(thick, nodes[nodes >= 0], t[nodes >= 0])
