@@ -22,6 +22,7 @@ TOOLS := build/tools/importers/installed build/tools/cofmupy/installed
 .PHONY: demo test instructions lint format tools study sanitize projections fuzz bench valgrind clean
 demo: $(VENV)/installed
 	$(BIN)/tiefmu demo --out out
+	$(BIN)/tiefmu accept examples/acceptance/weld.toml examples/acceptance/criteria.toml --pictures out/acceptance
 
 test: $(VENV)/installed tools
 	$(BIN)/python -m pytest -n 2

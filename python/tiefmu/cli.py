@@ -1,19 +1,18 @@
-"""The command line: build, info, run, demo, study, advise."""
+"""The command line: build, info, run, accept, demo, import, study, advise."""
 
 import argparse
-import contextlib
 import json
 import os
 import sys
-import tempfile
-from collections.abc import Iterator
 from pathlib import Path
 
 from . import __version__, advise, study
+from .acceptance import command as accept_command
 from .arguments import check_folder_of, existing, is_fmu, positive
 from .decks import command as import_command
 from .demo import SCENES, demo
 from .errors import RunError, SceneError, UsageError
+from .models import fmu_of, show_warnings
 from .package import build
 from .plot import check_picture, plot
 from .report import counted, of_fmu, report, summary, text
@@ -25,7 +24,7 @@ SHOWN = 20  # outputs that `run` prints
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Runs a command; returns the exit status: 0, 1 (a check of the demo failed), 2 (bad input), 130 (Ctrl-C)."""
+    """Runs a command; returns the exit status: 0, 1 (a check or a criterion failed), 2 (bad input), 130 (Ctrl-C)."""
     options = parser().parse_args(arguments)
     try:
         status = options.command(options) or 0
@@ -66,6 +65,9 @@ def parser() -> argparse.ArgumentParser:
         metavar="FMU",
         type=Path,
         help="file to write (default: name of the scene + .fmu, in the current folder)",
+    )
+    build.add_argument(
+        "--criteria", metavar="TOML", type=Path, help="criteria of acceptance to put into the FMU, with their files"
     )
     build.set_defaults(command=run_build)
 
@@ -109,21 +111,17 @@ def parser() -> argparse.ArgumentParser:
     demo.add_argument("--scenes", metavar="DIR", type=Path, help="folder of the scenes (default: of the checkout)")
     demo.set_defaults(command=run_demo)
 
+    accept_command.add_parser(commands)
     import_command.add_parser(commands)
     study.add_parser(commands)
     advise.add_parser(commands)
     return top
 
 
-def show_warnings(file: str, found: dict) -> None:
-    """The warnings of a report, on stderr."""
-    for line in found["warnings"]:
-        print(f"warning: {file}: {line}", file=sys.stderr)
-
-
 def run_build(options: argparse.Namespace) -> None:
     scene = load(options.scene)
-    fmu = build(scene, options.output or Path(f"{scene.name}.fmu"))
+    criteria = accept_command.packed(options.criteria) if options.criteria else {}
+    fmu = build(scene, options.output or Path(f"{scene.name}.fmu"), criteria)
     found = report(scene)
     show_warnings(options.scene, found)
     print(f"{fmu}: {summary(found)}, {fmu.stat().st_size / 1024:.0f} KiB")
@@ -162,19 +160,6 @@ def run_run(options: argparse.Namespace) -> None:
             print(f"  {name:<24} from {low:<12.6g} to {high:<12.6g} at the end {last:.6g}")
         if len(result.names) > SHOWN:
             print(f"  ... and {len(result.names) - SHOWN} more (--output writes all)")
-
-
-@contextlib.contextmanager
-def fmu_of(model: str) -> Iterator[Path]:
-    """The FMU, or that of the scene, whose warnings are shown; in a temporary folder."""
-    if is_fmu(model):
-        yield existing(model)
-        return
-    with tempfile.TemporaryDirectory(prefix="tiefmu-") as folder:
-        scene = load(model)
-        fmu = build(scene, Path(folder) / f"{scene.name}.fmu")
-        show_warnings(model, report(scene))
-        yield fmu
 
 
 def run_demo(options: argparse.Namespace) -> int:

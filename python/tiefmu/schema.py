@@ -6,7 +6,7 @@ Only what one table shows by itself is checked here. References between tables a
 import difflib
 import re
 import sys
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import (
     AfterValidator,
@@ -276,6 +276,9 @@ class Interface(Table):
     ports: list[Port] = []
 
 
+File = TypeVar("File", bound=Table)
+
+
 class SceneTables(Table):
     """A whole scene file."""
 
@@ -307,38 +310,48 @@ ARRAYS = ("node", "tie", "spring", "initial")  # written [[node]]
 
 def parse(raw: dict) -> SceneTables:
     """The tables of a scene; SceneError names the first thing that is wrong."""
+    return parse_as(SceneTables, TABLES, ARRAYS, raw)
+
+
+def parse_as(top: type[File], tables: dict[str, type[Table]], arrays: tuple[str, ...], raw: dict) -> File:
+    """The tables of a file of the kind `top`; SceneError names the first thing that is wrong. tables: the kind of each;
+    arrays: those of them that are written [[name]]."""
     try:
-        return SceneTables.model_validate(raw)
+        return top.model_validate(raw)
     except ValidationError as error:
-        raise SceneError(describe(dict(error.errors(include_url=False)[0]), raw)) from None
+        found = dict(error.errors(include_url=False)[0])
+        raise SceneError(describe(found, raw, top, tables, arrays)) from None
 
 
 def table_name(key: str, number: int, table: Any) -> str:
     """How messages call the table `number` (from 1) of the array of tables `key`."""
-    if key == "tie" and isinstance(table, dict) and isinstance(table.get("name"), str) and table["name"]:
-        return f"tie '{table['name']}'"
+    named = isinstance(table, dict) and isinstance(table.get("name"), str) and table["name"]
+    if named and key not in ("node", "spring", "initial"):
+        return f"{key} '{table['name']}'"
     return f"node table {number}" if key == "node" else f"{key} {number}"
 
 
-def describe(error: dict, raw: dict) -> str:
+def describe(error: dict, raw: dict, top: type[Table], tables: dict[str, type[Table]], arrays: tuple[str, ...]) -> str:
     """One line for an error of pydantic: table, key or id, what was found, what would be right."""
     location, kind = list(error["loc"]), error["type"]
     where: list[str] = []
-    model: type[Table] = SceneTables
-    if len(location) > 1 and location[0] in ARRAYS:
+    model: type[Table] = top
+    if len(location) > 1 and location[0] in arrays:
         head, index = location[:2]
         where.append(table_name(head, index + 1, raw[head][index]))
-        model, location = TABLES[head], location[2:]
+        model, location = tables[head], location[2:]
     elif location[:1] == ["mesh"] and len(location) > 2 and isinstance(location[2], int):
         return ": ".join(["mesh", mesh_row(location[1], location[2:], raw["mesh"][location[1]], error)])
-    elif len(location) > 1 and location[0] in TABLES:
+    elif len(location) > 1 and location[0] in tables:
         where.append(location[0])
-        model, location = TABLES[location[0]], location[1:]
+        model, location = tables[location[0]], location[1:]
 
     if kind == "extra_forbidden":
         key = str(location[-1])
         return ": ".join([*where, f"unknown key '{key}'{suggestion(key, model.model_fields)}"])
     where += [f"entry {part + 1}" if isinstance(part, int) else str(part) for part in location]
+    if kind == "list_type" and location[-1] in arrays:
+        return ": ".join([*where, f"expected tables written [[{location[-1]}]], found {found(error['input'])}"])
     return ": ".join([*where, explain(error)])
 
 
@@ -386,8 +399,6 @@ def explain(error: dict) -> str:
         return f"{value} is not a finite number"
     if kind == "float_type" and type(value) is int:
         return f"{found(value)} is too large; it must be at most {LARGEST:g}"
-    if kind == "list_type" and error["loc"][-1] in ARRAYS:
-        return f"expected tables written [[{error['loc'][-1]}]], found {found(value)}"
     if kind in EXPECTED:
         return f"expected {EXPECTED[kind]}, found {found(value)}"
     if kind == "greater_than_equal":

@@ -1,0 +1,1 @@
+"""Judging a run of an FMU by criteria: docs/acceptance.md."""
