@@ -1,8 +1,8 @@
 """Finite-element decks as scenes: `tiefmu import DECK`, and decks where scenes are asked for.
 
-A reader of a language (radioss/, abaqus/) fills a Deck (model.py); element_properties.py gives its nodes masses,
-inertias and stiffnesses; to_scene.py makes the scene of its ties; settle.py looks at pairs of slave and segment;
-write.py puts it into files.
+A reader of a language (radioss/, abaqus/, dyna/) fills a Deck (model.py); element_properties.py gives its nodes
+masses, inertias and stiffnesses; to_scene.py makes the scene of its ties; settle.py looks at pairs of slave and
+segment; write.py puts it into files.
 """
 
 import tempfile
@@ -10,11 +10,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from .._core import SceneError
-from . import abaqus, radioss, to_scene, write
+from . import abaqus, dyna, radioss, to_scene, write
 from .model import Deck
 from .settle import settle
 
-LANGUAGES = (radioss, abaqus)
+LANGUAGES = (radioss, dyna, abaqus)
 HEAD = 4096  # bytes by which a language is told
 NOT_DECKS = (".toml", ".fmu", ".json", ".csv")
 
@@ -50,7 +50,7 @@ def read(path: Path, ties: list[str] | None = None, free: tuple[str, ...] = ()) 
         raise SceneError(f"{path}: no such file")
     reader = language(path)
     if reader is None:
-        raise SceneError(f"{path}: is no deck; Radioss starter decks can be imported")
+        raise SceneError(f"{path}: is no deck; Radioss starter decks and LS-DYNA keyword decks can be imported")
     deck = reader.read(path, str(path), ties)
     found = Imported(deck, to_scene.convert(deck, free))
     if found.scene.pairwise:

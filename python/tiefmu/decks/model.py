@@ -111,7 +111,9 @@ class Tie:
     """A tied interface. slaves: node indices; search_distance: None, the default of the language; pairwise: None, or
     (shares of the shorter diagonal and of the summed thicknesses): what is farther than the larger one, plus the
     length pairwise_more, is dropped. thick_slaves: whether the slaves' thickness counts there. adjust: slaves are
-    moved to the surface, thickness counted as in pairwise. hand_on_rotations: false where slaves pass no moment on."""
+    moved to the surface, thickness counted as in pairwise. hand_on_rotations: false where slaves pass no moment on;
+    slave_rotations: false where those of slaves are not tied; slave_thickness: per node of the deck, as `pairwise` counts
+    it, or None: that of its shells."""
 
     name: str
     slaves: np.ndarray
@@ -125,6 +127,8 @@ class Tie:
     thick_slaves: bool = True
     adjust: bool = False
     hand_on_rotations: bool = True
+    slave_rotations: bool = True
+    slave_thickness: np.ndarray | None = None
     where: str = ""
 
 

@@ -140,6 +140,20 @@ def shells_of(deck: Deck, selected: dict[str, np.ndarray]) -> Faces:
     )
 
 
+def segments_of_nodes(deck: Deck, nodes: np.ndarray) -> Faces:
+    """Faces given by node indices (m, 4; -1 as a triangle's fourth); each takes element, part and thickness of the
+    shell that has the same nodes."""
+    faces = tidy(nodes)
+    element, part, thickness = np.zeros(len(faces), np.int64), np.zeros(len(faces), np.int64), np.zeros(len(faces))
+    shells = shells_of(deck, {kind: np.ones(len(one.id), bool) for kind, one in deck.elements.items()})
+    if len(shells):
+        place = match_rows(np.sort(shells.nodes, axis=1), np.sort(faces, axis=1))
+        hit = place >= 0
+        element[hit], part[hit] = shells.element[place[hit]], shells.part[place[hit]]
+        thickness[hit] = shells.thickness[place[hit]]
+    return Faces(faces, element, part, thickness)
+
+
 def all_faces(deck: Deck, selected: dict[str, np.ndarray]) -> Faces:
     """Shells and every face of the selected solids, each once."""
     groups = [shells_of(deck, selected)]

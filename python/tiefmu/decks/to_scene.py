@@ -226,6 +226,8 @@ def drop_rotations(deck: Deck, values: Nodal, slave: np.ndarray):
                     f"{tie.where}: tie '{tie.name}' hands no rotations on: its masters are taken without rotations, in "
                     "all ties that they belong to"
                 )
+        elif not tie.slave_rotations:
+            lone = tie.slaves[values.rotations[tie.slaves]]
         elif tie.formulation == "default":
             lone = tie.slaves[values.rotations[tie.slaves]]
             lone = lone[~masters_rotate(deck, tie, values, lone)] if len(lone) else lone
@@ -308,8 +310,8 @@ def pair_tolerance(deck: Deck, tie: Tie, share: float) -> dict:
     four = np.where(tie.faces.nodes < 0, tie.faces.nodes[:, [2]], tie.faces.nodes)
     x = deck.position[four]
     diagonals = np.stack([np.linalg.norm(x[:, i] - x[:, i + 2], axis=1) for i in (0, 1)])
-    thick = np.zeros(len(deck.node_id))
-    for kind, elements in deck.elements.items() if tie.thick_slaves else ():
+    thick = np.zeros(len(deck.node_id)) if tie.slave_thickness is None else tie.slave_thickness
+    for kind, elements in deck.elements.items() if tie.thick_slaves and tie.slave_thickness is None else ():
         if kind in TURNING and kind != "beam":
             t = np.repeat(deck.thickness(elements), elements.nodes.shape[1])
             nodes = elements.nodes.ravel()

@@ -3,7 +3,8 @@
 import numpy as np
 
 from ..model import Deck, Faces
-from ..surfaces import all_faces, exterior, shells_of, tidy
+from ..selected import Selected, combine
+from ..surfaces import all_faces, exterior, segments_of_nodes, shells_of
 from .cards import Block
 
 # Groups of elements: keyword -> kinds of elements, and the words by which the type names single elements.
@@ -24,7 +25,6 @@ SET_KINDS = {
     "TRUSS": ("truss",),
     "BEAM": ("beam",),
 }
-Selection = dict[str, np.ndarray]  # kind -> bool per element
 
 
 class Sets:
@@ -226,7 +226,7 @@ class Sets:
         _, cards = block.titled()
         ids = cards.ids()
         if kind in SINGLE:
-            return Selected.of_ids(self.deck, kinds, self.shifted(ids, block.offsets.element), block)
+            return Selected.of_ids(self.deck, kinds, self.shifted(ids, block.offsets.element), block.fail)
         if kind == "GENE":
             ranges = ids[: len(ids) // 2 * 2].reshape(-1, 2) + block.offsets.element
             return Selected.of_ranges(self.deck, kinds, ranges.tolist())
@@ -285,18 +285,7 @@ class Sets:
         if missing.any():
             row = int(np.argmax(missing.any(axis=1)))
             block.fail(f"node {nodes[row][missing[row]][0]} is not in the deck", 1 + int(index[row]))
-        faces = tidy(found)
-        element, part, thickness = np.zeros(len(faces), np.int64), np.zeros(len(faces), np.int64), np.zeros(len(faces))
-        every = {kind: np.ones(len(one.id), bool) for kind, one in self.deck.elements.items()}
-        shells = shells_of(self.deck, every)
-        if len(shells):
-            from ..surfaces import match_rows
-
-            place = match_rows(np.sort(shells.nodes, axis=1), np.sort(faces, axis=1))
-            hit = place >= 0
-            element[hit], part[hit] = shells.element[place[hit]], shells.part[place[hit]]
-            thickness[hit] = shells.thickness[place[hit]]
-        return Faces.joined([Faces(faces, element, part, thickness)])
+        return Faces.joined([segments_of_nodes(self.deck, found)])
 
     # /SET/GENERAL and /SET/COLLECT
 
@@ -316,64 +305,6 @@ class Sets:
         if clause:
             found.add(clause, rows)
         return found
-
-
-def combine(mask: np.ndarray, signed) -> np.ndarray:
-    for sign, other in signed:
-        mask = mask | other if sign else mask & ~other
-    return mask
-
-
-class Selected:
-    """A choice of elements: kinds[kind] is a bool per element."""
-
-    def __init__(self, kinds: Selection):
-        self.kinds = kinds
-
-    @staticmethod
-    def of_parts(deck: Deck, parts: set[int]) -> "Selected":
-        wanted = np.array(sorted(parts), np.int64)
-        return Selected({kind: np.isin(one.part, wanted) for kind, one in deck.elements.items()})
-
-    @staticmethod
-    def of_ids(deck: Deck, kinds: tuple[str, ...], ids: np.ndarray, block: Block) -> "Selected":
-        found, seen = {}, np.zeros(len(ids), bool)
-        for kind in kinds:
-            if kind in deck.elements:
-                one = deck.elements[kind]
-                found[kind] = np.isin(one.id, ids[ids > 0])
-                seen |= np.isin(np.abs(ids), one.id)
-        if not seen.all():
-            block.fail(f"element {abs(ids[~seen][0])} is not in the deck")
-        return Selected(found)
-
-    @staticmethod
-    def of_ranges(deck: Deck, kinds: tuple[str, ...], ranges: list) -> "Selected":
-        found = {}
-        for kind in kinds:
-            if kind in deck.elements:
-                ids = deck.elements[kind].id
-                found[kind] = np.logical_or.reduce([(ids >= a) & (ids <= b) for a, b in ranges] or [ids < 0])
-        return Selected(found)
-
-    def plus(self, other: "Selected") -> "Selected":
-        found = dict(self.kinds)
-        for kind, mask in other.kinds.items():
-            found[kind] = found[kind] | mask if kind in found else mask
-        return Selected(found)
-
-    def minus(self, other: "Selected") -> "Selected":
-        return Selected({k: mask & ~other.kinds[k] if k in other.kinds else mask for k, mask in self.kinds.items()})
-
-    def only(self, kinds: tuple[str, ...]) -> "Selected":
-        return Selected({kind: mask for kind, mask in self.kinds.items() if kind in kinds})
-
-    def nodes(self, deck: Deck) -> np.ndarray:
-        mask = np.zeros(len(deck.node_id), bool)
-        for kind, which in self.kinds.items():
-            nodes = deck.elements[kind].nodes[which]
-            mask[nodes[nodes >= 0]] = True
-        return mask
 
 
 class GeneralSet:
@@ -414,7 +345,7 @@ class GeneralSet:
             if generate:
                 found = Selected.of_ranges(deck, SET_KINDS[kind], [[r[0] + shift, r[1] + shift] for r in rows])
             else:
-                found = Selected.of_ids(deck, SET_KINDS[kind], sets.shifted(numbers, shift), block)
+                found = Selected.of_ids(deck, SET_KINDS[kind], sets.shifted(numbers, shift), block.fail)
             self.elements = self.elements.minus(found) if remove else self.elements.plus(found)
             self.by_part = self.by_part.minus(found) if remove else self.by_part
         elif kind in ("PART", "SUBS", "MAT", "PROP"):
