@@ -15,7 +15,7 @@ class DynaDeck:
         self.lines = [] if bare else [first]
 
     def card(self, layout: str, *values) -> str:
-        words = ["" if value is None else repr(value) if isinstance(value, float) else str(value) for value in values]
+        words = ["" if value is None else self.word(value) for value in values]
         if self.form == "comma":
             return ",".join(words)
         found = ""
@@ -25,6 +25,14 @@ class DynaDeck:
             assert len(word) <= width, (word, width)
             found += word.ljust(width) if letter == "s" else word.rjust(width)
         return found
+
+    @staticmethod
+    def word(value) -> str:
+        """A number in the shortest way."""
+        if not isinstance(value, float):
+            return str(value)
+        found = min((repr(value), f"{value:g}", f"{value:.12g}"), key=lambda text: (float(text) != value, len(text)))
+        return found if "." in found or "e" in found else found + "."
 
     def block(self, keyword: str, *cards, title: str | None = None):
         self.lines.append(f"*{keyword}")
@@ -64,7 +72,11 @@ class DynaDeck:
         self, slave=1, master=1, types=(4, 3), number=1, title="weld", name="TIED_SHELL_EDGE_TO_SURFACE",
         thickness=(0.0, 0.0), scale=(1.0, 1.0), boxes=(0, 0), option="_ID",
     ):  # fmt: skip
-        head = [("is", number, title) if self.form == "comma" else f"{number:>10}{title}"] if option == "_ID" else []
+        head = (
+            [("is", number, title) if self.form == "comma" else self.card("i", number) + title]
+            if option == "_ID"
+            else []
+        )
         rows = [("i" * 6, slave, master, *types, *boxes), ("rr", 0.0, 0.0), ("rrrrrr", 0.0, 0.0, *thickness, *scale)]
         return self.block(f"CONTACT_{name}{option}", *head, *rows)
 

@@ -181,7 +181,7 @@ def solids(deck: Deck, block: Block, found: Collected):
     short = ~rows[:, 2:].any(axis=1)
     heads = bodies = np.arange(len(rows))
     if short.any() or more:
-        alone: list[bool] = short.tolist()
+        alone = np.asarray(short).tolist()
         first, body, row = [], [], 0
         while row < len(rows):
             first.append(row)

@@ -76,7 +76,7 @@ class Contact:
             self.title = (
                 line.partition(",")[2].strip()
                 if "," in line[:11]
-                else block.lines[0][10:].decode("utf-8", "replace").strip()
+                else block.lines[0][block.width("i") :].decode("utf-8", "replace").strip()
             )
             card = 1
         if block.has("MPP"):

@@ -7,6 +7,8 @@ from .cards import Block, Origin
 
 KNOWN = ("MIRROR", "POINT", "POS6N", "POS6P", "ROTATE", "ROTATE3NA", "SCALE", "TRANSL", "TRANSL2ND")
 
+BY_NODES = ("TRANSL2ND", "ROTATE3NA", "POS6N")
+
 
 class Transformations:
     """The transformations of a deck, by id."""
@@ -30,13 +32,13 @@ class Transformations:
                 number, asker = named
                 if number not in self.blocks:
                     asker.fail(f"transformation {number} is not in the deck")
-                x = self.apply(x, *self.blocks[number])
+                x = self.apply(x, *self.blocks[number], asker)
         return x
 
-    def apply(self, x: np.ndarray, block: Block, first: int) -> np.ndarray:
-        """One transformation, its lines in their order."""
+    def apply(self, x: np.ndarray, block: Block, first: int, asker: Block) -> np.ndarray:
+        """One transformation, its lines in their order, in the units of the file that asks for it."""
         points: dict[int, np.ndarray] = {}
-        unit = block.origin.unit(length=1)
+        unit = block.origin.length / asker.origin.length
         for card in range(first, block.end):
             word, *values = block.read(card, "srrrrrrr")
             word = word.upper()
@@ -44,6 +46,8 @@ class Transformations:
                 continue
             if word not in KNOWN:
                 block.fail(f"'{word}' is not understood; {', '.join(KNOWN)} are", card)
+            if word in BY_NODES and asker.origin.steps:
+                asker.fail(f"{word} moves only what the main file includes")
             a = np.array(values)
             if word == "POINT":
                 points[int(a[0])] = a[1:4] * unit
