@@ -23,7 +23,7 @@ def settle(deck: Deck, written: Written, scene):
         near = found["distance"][mine] <= limit * (1 + 1e-12)
         drop(deck, written, name, ids[near])
         if pair["adjust"]:
-            gap = pair["share"] * thick[1] * pair["factor"] / written.unit
+            gap = thick[1] * (0.0 if pair["onto_middle"] else pair["share"] * pair["factor"] / written.unit)
             move(deck, written, name, {key: found[key][mine[near]] for key in ("id", "nodes", "weights")}, gap[near])
     written.pairwise = {}
 
@@ -70,6 +70,6 @@ def move(deck: Deck, written: Written, name: str, slaves: dict[str, np.ndarray],
     far = np.abs(distance - gap)
     worst = int(np.argmax(far))
     deck.notes.append(
-        f"tie '{name}': {moved.sum()} slaves are moved to the surface (ADJUST), node {slaves['id'][moved][worst]} the "
+        f"tie '{name}': {moved.sum()} slaves are moved to the surface, node {slaves['id'][moved][worst]} the "
         f"farthest, by {far[worst]:.4g}"
     )

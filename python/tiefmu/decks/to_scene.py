@@ -299,7 +299,7 @@ def tie_table(deck: Deck, tie: Tie, written: Written, scale: Scale) -> dict:
         tolerance["segment"] = written.segment_id[place]
         tolerance["factor"] = float(scale.factors[0])
         tolerance["share"], tolerance["more"] = tie.pairwise[1], tie.pairwise_more
-        tolerance["adjust"] = tie.adjust
+        tolerance["adjust"], tolerance["onto_middle"] = tie.adjust, tie.onto_middle
         written.pairwise[tie.name] = tolerance
     return table
 

@@ -59,6 +59,7 @@ def read(path: Path, file: str, wanted: list[str] | None = None) -> Deck:
     tables = Tables(deck, found, viscosity[0] if viscosity else 0.0)
     tables.read_sections(of("SECTION"))
     tables.read_parts(of("PART"))
+    tables.read_orientations(of("DEFINE_SD_ORIENTATION"))
     read_elements(deck, of, tables)
     check_references(deck, tables)
     check(deck, f"{file}: *CONTROL_UNITS", read_units(deck, of("CONTROL_UNITS")))

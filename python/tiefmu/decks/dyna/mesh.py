@@ -242,16 +242,15 @@ def discrete(deck: Deck, block: Block, found: Collected, tables: Tables):
     """*ELEMENT_DISCRETE: springs and dampers between two nodes."""
     (number, pid, a, b, vid, scale, *_), cards = block.table("IIIIIRIR")
     ids, part = number + block.origin.element, pid + block.origin.part
-    grounded = b == 0
-    if grounded.any():
+    scale = np.where(scale == 0, 1.0, scale)
+    aimless = (b == 0) & (vid == 0)
+    if aimless.any():
         deck.warn(
-            f"{block.at(int(cards[np.argmax(grounded)]))}: {grounded.sum()} springs to the ground are left out; give "
-            "them as [[spring]] to a fixed node"
+            f"{block.at(int(cards[np.argmax(aimless)]))}: {aimless.sum()} springs to the ground without orientation have "
+            "no direction and are left out"
         )
-    keep = ~grounded
-    ids, part, cards = ids[keep], part[keep], cards[keep]
-    vid, scale = vid[keep], np.where(scale[keep] == 0, 1.0, scale[keep])
-    index = known(deck, block, cards, ids, part, np.stack([a[keep], b[keep]], axis=1), 2)
+        ids, part, a, b, vid, scale, cards = (one[~aimless] for one in (ids, part, a, b, vid, scale, cards))
+    index = known(deck, block, cards, ids, part, np.stack([a, b], axis=1), 1)
     own = np.stack([part.astype(float), vid.astype(float), scale], axis=1)
     for row in np.unique(own, axis=0):
         which = (own == row).all(axis=1)

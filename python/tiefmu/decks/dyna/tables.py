@@ -23,6 +23,7 @@ class Tables:
         self.contact: dict[int, tuple[float, float]] = {}
         self.centre_node: dict[int, int] = {}
         self.stand_ins: dict[int, list[int]] = {}
+        self.orientations: dict[int, tuple[Block, int]] = {}
         self._springs: dict[tuple, int] = {}
 
     # parts
@@ -218,10 +219,20 @@ class Tables:
                 what = "is no spring or damper" if part.material in deck.materials else "is not in the deck"
                 block.fail(f"part {number}: material {part.material} {what}", card)
             law, k, c = self.materials.springs[part.material]
-            kind = "other" if section.kind != "discrete" or section.values["torsion"] or orientation else "spring"
-            made = Property(self.fresh(deck.properties), kind, law, section.title, where=block.at(card))
-            made.values = {"type": "axial", "mass": 0.0, "inertia": 0.0, "skew": 0}
-            made.values |= spring_values([k * scale] + [0.0] * 5, [c * scale] + [0.0] * 5)
+            torsion = section.values.get("torsion", False)
+            frame = self.orientation(orientation, block, card) if orientation else 0
+            known = section.kind == "discrete" and frame is not None and (frame or not torsion)
+            made = Property(
+                self.fresh(deck.properties), "spring" if known else "other", law, section.title, where=block.at(card)
+            )
+            made.values = {"type": "general" if frame else "axial", "skew": frame or 0, "turning": torsion}
+            k, c = k * scale, c * scale
+            if torsion:
+                unit = block.origin.unit(length=2)  # moments, where the material has scaled forces
+                made.values |= spring_values([0.0] * 3 + [k * unit, 0.0, 0.0], [0.0] * 3 + [c * unit, 0.0, 0.0])
+            else:
+                made.values |= spring_values([k, 0.0, 0.0, 0.0, 0.0, 0.0], [c, 0.0, 0.0, 0.0, 0.0, 0.0])
+            made.values |= {"mass": 0.0, "inertia": 0.0}
             if law not in ("S01", "S02"):
                 made.values["nonlinear"] = [f"of *MAT_{law}"]
             deck.properties[made.id] = made
@@ -230,6 +241,37 @@ class Tables:
             self.stand_ins.setdefault(number, []).append(stand_in.id)
             self._springs[key] = stand_in.id
         return self._springs[key]
+
+    def read_orientations(self, blocks: list[Block]):
+        """*DEFINE_SD_ORIENTATION."""
+        for block in blocks:
+            card, titled = 0, block.has("TITLE")
+            while card < block.end:
+                card += titled
+                number = block.id("define", block.read(card, "i")[0])
+                self.orientations[number] = (block, card)
+                card += 1
+
+    def orientation(self, number: int, block: Block, card: int) -> int | None:
+        """Id of the axes, the first of which is that of an orientation; None where it is of a kind not understood."""
+        if number not in self.orientations:
+            block.fail(f"orientation {number} is not in the deck", card)
+        own, line = self.orientations[number]
+        _, kind, *vector = own.read(line, "iirrr")
+        axis = np.array(vector)
+        if kind == 2:
+            nodes = self.deck.nodes([own.id("node", node) for node in own.read(line, ".....ii")], own.at(line))
+            axis = self.deck.position[nodes[1]] - self.deck.position[nodes[0]]
+        if kind not in (0, 2):
+            return None
+        if not np.linalg.norm(axis) > 0:
+            own.fail(f"orientation {number} has no direction", line)
+        x = axis / np.linalg.norm(axis)
+        y = np.cross(np.eye(3)[int(np.argmin(np.abs(x)))], x)
+        y /= np.linalg.norm(y)
+        ident = len(self.deck.frames) + 1
+        self.deck.frames[ident] = np.stack([x, y, np.cross(x, y)])
+        return ident
 
     def with_stand_ins(self, parts: set[int]) -> set[int]:
         return parts.union(*(self.stand_ins.get(number, []) for number in parts))

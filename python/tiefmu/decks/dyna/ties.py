@@ -131,6 +131,8 @@ def read(deck: Deck, sets: Sets, tables: Tables, contact: Contact, kind: Kind) -
         hand_on_rotations=kind.turns or kind.offset in OFFSETS[:2],
         slave_rotations=kind.turns,
         slave_thickness=slave_thickness(deck, tables, contact, negative),
+        adjust=not kind.offset and not kind.penalty,
+        onto_middle=True,
         where=block.where,
     )
     say(deck, contact, kind, tie, negative)
@@ -152,8 +154,8 @@ def say(deck: Deck, contact: Contact, kind: Kind, tie: Tie, negative: bool):
         said.append("translations alone are tied; rotations are left out")
     if kind.edge_to_solid:
         said.append("formulation optimized, as moments go to solids as couples")
-    if not kind.offset:
-        said.append("slaves stay where they are and are not moved onto the surface")
+    if tie.adjust:
+        said.append("slaves are moved onto the surface, as the contact has no _OFFSET")
     if negative:
         said.append(
             f"tolerance 0.6 (|SST| + |MST|) = {CRITERION[1] * (abs(contact.sst) + abs(contact.mst)):g}, as one of them "
