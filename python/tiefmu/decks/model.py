@@ -110,10 +110,10 @@ class Faces:
 class Tie:
     """A tied interface. slaves: node indices; search_distance: None, the default of the language; pairwise: None, or
     (shares of the shorter diagonal and of the summed thicknesses): what is farther than the larger one, plus the
-    length pairwise_more, is dropped. thick_slaves: whether the slaves' thickness counts there; slave_thickness: per node
-    of the deck, or None: that of its shells. adjust: slaves are moved to the surface, thickness counted as in pairwise,
-    or, with onto_middle, to its middle. hand_on_rotations: false where slaves pass no moment on; slave_rotations: false
-    where those of slaves are not tied."""
+    length pairwise_more, is dropped. thick_slaves: whether the slaves' thickness counts there; slave_thickness: per
+    node of the deck, or None: that of its shells. adjust: slaves are moved to the surface, thickness counted as in
+    pairwise, or, with onto_middle, to its middle. hand_on_rotations: false where slaves pass no moment on;
+    slave_rotations: false where those of slaves are not tied."""
 
     name: str
     slaves: np.ndarray

@@ -246,8 +246,8 @@ def discrete(deck: Deck, block: Block, found: Collected, tables: Tables):
     aimless = (b == 0) & (vid == 0)
     if aimless.any():
         deck.warn(
-            f"{block.at(int(cards[np.argmax(aimless)]))}: {aimless.sum()} springs to the ground without orientation have "
-            "no direction and are left out"
+            f"{block.at(int(cards[np.argmax(aimless)]))}: {aimless.sum()} springs to the ground without orientation "
+            "have no direction and are left out"
         )
         ids, part, a, b, vid, scale, cards = (one[~aimless] for one in (ids, part, a, b, vid, scale, cards))
     index = known(deck, block, cards, ids, part, np.stack([a, b], axis=1), 1)
