@@ -9,7 +9,7 @@
 #include <unordered_map>
 #include <vector>
 
-#include "../modelDescription/resource.hpp"
+#include "resource.hpp"
 #include "../modelDescription/variables.hpp"
 #include "log.hpp"
 #include "refused.hpp"

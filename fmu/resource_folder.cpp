@@ -4,7 +4,7 @@
 #include <fstream>
 #include <iterator>
 
-#include "../modelDescription/bytes.hpp"
+#include "bytes.hpp"
 
 namespace tiefmu {
 namespace {

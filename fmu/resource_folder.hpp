@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "../modelDescription/resource.hpp"
+#include "resource.hpp"
 
 namespace tiefmu {
 

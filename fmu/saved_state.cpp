@@ -6,7 +6,7 @@
 #include <cstring>
 #include <ostream>
 
-#include "../modelDescription/bytes.hpp"
+#include "bytes.hpp"
 
 namespace tiefmu {
 namespace {

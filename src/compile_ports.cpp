@@ -1,12 +1,24 @@
 // Ports to their nodes or slaves.
 #include <Eigen/Eigenvalues>
-#include <Eigen/QR>
 #include <algorithm>
 
 #include "compilation.hpp"
 #include "port.hpp"
 
 namespace tiefmu {
+namespace {
+
+// The shortest w with J w = l, J the inertia of arms: nodes on a line say nothing of a turn about it.
+Vec3 leastTurn(const Mat3& j, const Vec3& l) {
+  const Eigen::SelfAdjointEigenSolver<Mat3> eigen(j);
+  Vec3 w = Vec3::Zero();
+  for (int i = 0; i < 3; ++i)
+    if (eigen.eigenvalues()[i] * conditionRefused > eigen.eigenvalues()[2])
+      w += eigen.eigenvectors().col(i).dot(l) / eigen.eigenvalues()[i] * eigen.eigenvectors().col(i);
+  return w;
+}
+
+}  // namespace
 
 // Those of driven nodes first.
 void Compilation::placePorts() {
@@ -102,7 +114,7 @@ void Compilation::startMotion(Port& port, const std::string& where) {
   if (rotating < model.rotating())
     port.spin = at(model.nodeSpin.data(), rotating);
   else if (!turn.isZero(0))
-    port.spin = armInertia(arm).completeOrthogonalDecomposition().solve(turn);
+    port.spin = leastTurn(armInertia(arm), turn);
   port.velocity = meanVelocity - port.spin.cross(meanArm);
   for (std::size_t i = 0; i < count; ++i) {
     const int node = port.member[i];

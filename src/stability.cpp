@@ -2,7 +2,6 @@
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
-#include <complex>
 #include <limits>
 
 #include "integrator.hpp"
@@ -17,8 +16,11 @@ constexpr int manyUnknowns = 3000;
 constexpr double looseTolerance = 1e-4;
 constexpr double none = 1e30;
 
-// Spectral radius of one step of size h on x'' = -omega^2 x - c x'.
-double nohBatheRadius(double h, double omega, double c) {
+// A step is stable if no root of its characteristic polynomial is larger than this.
+constexpr double largestRoot = 1 + 1e-10;
+
+// One step of size h on x'' = -omega^2 x - c x'.
+bool nohBatheStable(double h, double omega, double c) {
   constexpr double p = nohBathe::p, q0 = nohBathe::q0, q1 = nohBathe::q1, q2 = nohBathe::q2;
   Mat3 step;
   for (int column = 0; column < 3; ++column) {
@@ -34,17 +36,29 @@ double nohBatheRadius(double h, double omega, double c) {
     v += h2 * (q0 * a + (0.5 + q1) * a1 + q2 * a2);
     step.col(column) = Vec3(x, v, a2);
   }
-  return Eigen::EigenSolver<Mat3>(step, false).eigenvalues().cwiseAbs().maxCoeff();
+  // lambda^3 + a lambda^2 + b lambda + d for roots in units of the largest one allowed; all are inside the unit circle
+  // if the conditions of [Jury 1964] hold.
+  const Mat3 m = step / largestRoot;
+  const double a = -m.trace(), d = -m.determinant();
+  const double b = m(0, 0) * m(1, 1) - m(0, 1) * m(1, 0) + m(0, 0) * m(2, 2) - m(0, 2) * m(2, 0) + m(1, 1) * m(2, 2) -
+                   m(1, 2) * m(2, 1);
+  return 1 + a + b + d > 0 && 1 - a + b - d > 0 && std::abs(d) < 1 && 1 - d * d > std::abs(a * d - b);
 }
 
-double rk4Radius(double h, double omega, double c) {
-  double radius = 0;
-  const std::complex<double> root = std::sqrt(std::complex<double>(c * c - 4 * omega * omega));
-  for (double sign : {1.0, -1.0}) {
-    const std::complex<double> z = 0.5 * h * (-c + sign * root);
-    radius = std::max(radius, std::abs(1.0 + z * (1.0 + z / 2.0 * (1.0 + z / 3.0 * (1.0 + z / 4.0)))));
+// |R(h lambda)| for both roots of lambda^2 + c lambda + omega^2 = 0, R(z) = 1 + z + z^2/2 + z^3/6 + z^4/24.
+bool rk4Stable(double h, double omega, double c) {
+  const double discriminant = c * c - 4 * omega * omega, root = std::sqrt(std::abs(discriminant));
+  for (const double sign : {1.0, -1.0}) {
+    const double x = 0.5 * h * (discriminant < 0 ? -c : -c + sign * root), y = discriminant < 0 ? 0.5 * h * root : 0;
+    double re = 1, im = 0;
+    for (const double k : {4.0, 3.0, 2.0, 1.0}) {  // Horner: 1 + z/k (...)
+      const double next = 1 + (x * re - y * im) / k;
+      im = (x * im + y * re) / k;
+      re = next;
+    }
+    if (!(re * re + im * im <= largestRoot * largestRoot)) return false;
   }
-  return radius;
+  return true;
 }
 
 }  // namespace
@@ -58,8 +72,7 @@ double stableStep(Method method, double omega, double c) {
   omega *= scale;
   c *= scale;
   const auto stable = [&](double h) {
-    const double radius = method == Method::rk4 ? rk4Radius(h, omega, c) : nohBatheRadius(h, omega, c);
-    return radius <= 1 + 1e-10;
+    return method == Method::rk4 ? rk4Stable(h, omega, c) : nohBatheStable(h, omega, c);
   };
   double low = 0, high = 8;
   for (double h = 0.02; h < high; h += 0.02) {
@@ -136,7 +149,8 @@ Spectrum::Value Spectrum::lanczos(bool damping, double* mode, int vectors) {
   using Small = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, maxVectors, maxVectors>;
   const auto v = [&](int j) { return Vector(basis_.data() + static_cast<std::ptrdiff_t>(size_) * j, size_); };
   const auto mv = [&](int j) { return Vector(image_.data() + static_cast<std::ptrdiff_t>(size_) * j, size_); };
-  Small tridiagonal = Small::Zero(vectors, vectors);
+  using SmallVector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, maxVectors, 1>;
+  SmallVector diagonal = SmallVector::Zero(vectors), subdiagonal = SmallVector::Zero(vectors);
   mv(0) = Vector(mode, size_);
   v(0).setZero();
   solve(mv(0).data(), v(0).data());
@@ -152,7 +166,7 @@ Spectrum::Value Spectrum::lanczos(bool damping, double* mode, int vectors) {
     apply(v(j).data(), p.data(), damping);
     x.setZero();
     solve(p.data(), x.data());
-    tridiagonal(j, j) = v(j).dot(p);
+    diagonal(j) = v(j).dot(p);
     // Full reorthogonalisation; in the second sweep on an x made anew of p, as cancellation has parted the two.
     for (int sweep = 0; sweep < 2; ++sweep) {
       for (int i = 0; i <= j; ++i) {
@@ -163,13 +177,14 @@ Spectrum::Value Spectrum::lanczos(bool damping, double* mode, int vectors) {
       solve(p.data(), x.data());
     }
     beta = std::sqrt(std::max(0.0, x.dot(p)));
-    const double scale = tridiagonal.diagonal().head(used).cwiseAbs().maxCoeff();
+    const double scale = diagonal.head(used).cwiseAbs().maxCoeff();
     if (!(beta > tolerance * scale)) break;  // the space is exhausted: what is left is rounding
-    if (used < vectors) tridiagonal(j, j + 1) = tridiagonal(j + 1, j) = beta;
+    if (used < vectors) subdiagonal(j) = beta;
     x /= beta;
     p /= beta;
   }
-  const Eigen::SelfAdjointEigenSolver<Small> eigen(tridiagonal.topLeftCorner(used, used));
+  Eigen::SelfAdjointEigenSolver<Small> eigen;
+  eigen.computeFromTridiagonal(diagonal.head(used), subdiagonal.head(used - 1));
   const auto y = eigen.eigenvectors().col(used - 1);
   Vector ritz(mode, size_);
   ritz.setZero();

@@ -5,7 +5,7 @@
 
 #include <memory>
 
-#include "../../modelDescription/resource.hpp"
+#include "../../fmu/resource.hpp"
 #include "../../modelDescription/variables.hpp"
 #include "../../modelDescription/xml.hpp"
 #include "../../src/compile.hpp"

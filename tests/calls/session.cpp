@@ -9,7 +9,7 @@
 #include <memory>
 #include <numeric>
 
-#include "../../modelDescription/resource.hpp"
+#include "../../fmu/resource.hpp"
 #include "../../modelDescription/variables.hpp"
 #include "memory.hpp"
 
