@@ -9,10 +9,10 @@
 #include <unordered_map>
 #include <vector>
 
-#include "resource.hpp"
 #include "../modelDescription/variables.hpp"
 #include "log.hpp"
 #include "refused.hpp"
+#include "resource.hpp"
 #include "saved_state.hpp"
 #include "state.hpp"
 

@@ -183,13 +183,14 @@ Spectrum::Value Spectrum::lanczos(bool damping, double* mode, int vectors) {
     x /= beta;
     p /= beta;
   }
-  Eigen::SelfAdjointEigenSolver<Small> eigen;
-  eigen.computeFromTridiagonal(diagonal.head(used), subdiagonal.head(used - 1));
+  Eigen::SelfAdjointEigenSolver<Small> eigen;  // which takes what is small beside 1 for nothing
+  const double unit = std::max(diagonal.head(used).cwiseAbs().maxCoeff(), std::numeric_limits<double>::min());
+  eigen.computeFromTridiagonal(diagonal.head(used) / unit, subdiagonal.head(used - 1) / unit);
   const auto y = eigen.eigenvectors().col(used - 1);
   Vector ritz(mode, size_);
   ritz.setZero();
   for (int j = 0; j < used; ++j) ritz += y(j) * mv(j);
-  return {eigen.eigenvalues()(used - 1), beta * std::abs(y(used - 1))};
+  return {unit * eigen.eigenvalues()(used - 1), beta * std::abs(y(used - 1))};
 }
 
 Spectrum::Value Spectrum::largest(bool damping, double* mode) {
