@@ -161,7 +161,7 @@ void appendHead(std::string& out, const std::string& name, const std::string& ti
   attribute(out, "modelName", name);
   attribute(out, "guid", guid);
   if (!title.empty()) attribute(out, "description", title);
-  attribute(out, "generationTool", "tiefmu");
+  attribute(out, "generationTool", "tiefmu " TIEFMU_VERSION);
   attribute(out, "variableNamingConvention", structured ? "structured" : "flat");
   out += ">\n<CoSimulation";
   attribute(out, "modelIdentifier", modelIdentifier(name));

@@ -11,6 +11,20 @@ import fmpy
 import numpy as np
 import tiefmu
 
+# Refused, but there: some importers look up every function of the standard.
+MODEL_EXCHANGE = [
+    "EnterEventMode",
+    "NewDiscreteStates",
+    "EnterContinuousTimeMode",
+    "CompletedIntegratorStep",
+    "SetTime",
+    "SetContinuousStates",
+    "GetDerivatives",
+    "GetEventIndicators",
+    "GetContinuousStates",
+    "GetNominalsOfContinuousStates",
+]
+
 OK, WARNING, DISCARD, ERROR, FATAL, PENDING = range(6)
 # The logger is variadic; our messages come as the one argument after the format.
 Logger = ctypes.CFUNCTYPE(None, c_void_p, c_char_p, c_int, c_char_p, c_char_p, c_char_p)

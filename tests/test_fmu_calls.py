@@ -7,7 +7,7 @@ from ctypes import byref, c_char_p, c_double, c_int, c_size_t, c_uint, c_void_p
 
 import numpy as np
 import pytest
-from fmu_calls import DISCARD, ERROR, OK, Instance, diverged
+from fmu_calls import DISCARD, ERROR, MODEL_EXCHANGE, OK, Instance, diverged
 from fmu_scenes import random_values
 
 # ------------------------------------------------------------------------------------------- the library and its states
@@ -49,20 +49,6 @@ CO_SIMULATION = [
     "GetIntegerStatus",
     "GetBooleanStatus",
     "GetStringStatus",
-]
-
-# Refused, but there: some importers look up every function of the standard.
-MODEL_EXCHANGE = [
-    "EnterEventMode",
-    "NewDiscreteStates",
-    "EnterContinuousTimeMode",
-    "CompletedIntegratorStep",
-    "SetTime",
-    "SetContinuousStates",
-    "GetDerivatives",
-    "GetEventIndicators",
-    "GetContinuousStates",
-    "GetNominalsOfContinuousStates",
 ]
 
 

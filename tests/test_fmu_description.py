@@ -358,7 +358,9 @@ def test_default_experiment(tmp_path):
 
 
 def test_only_what_is_built_is_promised(tmp_path):
-    promises = Fmu(quad(), tmp_path).description.coSimulation
+    description = Fmu(quad(), tmp_path).description
+    assert description.generationTool == f"tiefmu {tiefmu.__version__}"
+    promises = description.coSimulation
     assert promises.canHandleVariableCommunicationStepSize and promises.canGetAndSetFMUstate
     assert not promises.canBeInstantiatedOnlyOncePerProcess and not promises.needsExecutionTool
     assert promises.canSerializeFMUstate and promises.providesDirectionalDerivative  # test_fmu_serialisation,

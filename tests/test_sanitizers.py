@@ -12,27 +12,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 import tiefmu
+from fmu_calls import MODEL_EXCHANGE
 from fmu_scenes import ALL_FREE, DRIVEN, MIXED, SETTINGS, scene
 from port_scenes import ported
 
 ROOT = Path(__file__).resolve().parents[1]
 SEQUENCES = int(os.environ.get("TIEFMU_SEQUENCES", 2000))
-NEVER_ALLOWED = {
-    "fmi2" + name
-    for name in (
-        "CancelStep",
-        "EnterEventMode",
-        "NewDiscreteStates",
-        "EnterContinuousTimeMode",
-        "CompletedIntegratorStep",
-        "SetTime",
-        "SetContinuousStates",
-        "GetDerivatives",
-        "GetEventIndicators",
-        "GetContinuousStates",
-        "GetNominalsOfContinuousStates",
-    )
-}
+NEVER_ALLOWED = {"fmi2" + name for name in ["CancelStep", *MODEL_EXCHANGE]}
 
 
 def program(preset: str) -> Path:
