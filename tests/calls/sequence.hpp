@@ -10,8 +10,6 @@
 
 #include "tests.hpp"
 
-constexpr double infinity = std::numeric_limits<double>::infinity(), nan = std::numeric_limits<double>::quiet_NaN();
-
 // SplitMix64: the same numbers everywhere.
 class Random {
  public:
@@ -56,6 +54,9 @@ class Sequence {
   void run();
 
  private:
+  static constexpr double infinity = std::numeric_limits<double>::infinity();
+  static constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+
   struct Kept {
     State state;
     double time, stop;

@@ -1,4 +1,6 @@
 // Arguments of the calls, sound or spoilt.
+#include <memory>
+
 #include "sequence.hpp"
 
 References Sequence::some(const References& from) {

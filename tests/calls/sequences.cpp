@@ -1,6 +1,5 @@
 #include <cstdio>
 #include <cstring>
-#include <memory>
 
 #include "memory.hpp"
 #include "sequence.hpp"
