@@ -8,7 +8,7 @@ from pathlib import Path
 
 from . import __version__, advise, study
 from .acceptance import command as accept_command
-from .arguments import check_folder_of, existing, is_fmu, positive
+from .arguments import check_folder_of, existing, is_fmu, positive, whole
 from .decks import command as import_command
 from .demo import SCENES, demo
 from .errors import RunError, SceneError, UsageError
@@ -19,6 +19,7 @@ from .report import counted, of_fmu, report, summary, text
 from .results import check_format
 from .run import run
 from .scene import load
+from .view.vtk import FIELDS, FRAMES, NODE_FIELDS, write_ties
 
 SHOWN = 20  # outputs that `run` prints
 
@@ -78,6 +79,12 @@ def parser() -> argparse.ArgumentParser:
     )
     info.add_argument("model", metavar="SCENE-or-FMU", help="scene file (TOML) or FMU made by tiefmu")
     info.add_argument("--json", action="store_true", help="the whole report as JSON")
+    info.add_argument(
+        "--vtu", metavar="VTU", type=Path, help="file to write the ties to, for ParaView: segments, slaves, projections"
+    )
+    info.add_argument(
+        "--fields", metavar="NAME", nargs="+", help=f"of --vtu, default all: {', '.join([*FIELDS, *NODE_FIELDS])}"
+    )
     info.set_defaults(command=run_info)
 
     run = commands.add_parser(
@@ -99,6 +106,16 @@ def parser() -> argparse.ArgumentParser:
         help="file to write the outputs to, row by row: .csv, .parquet or .h5 (for many variables)",
     )
     run.add_argument("--plot", metavar="PNG", type=Path, help="file to draw the outputs to, .png or .svg")
+    run.add_argument(
+        "--pvd",
+        metavar="PVD",
+        type=Path,
+        help="file for ParaView: the moving mesh over time, with velocities and reactions; its VTU files lie in the "
+        "folder PVD_frames",
+    )
+    run.add_argument(
+        "--frames", metavar="N", type=whole, default=FRAMES, help=f"most frames of --pvd (default: {FRAMES})"
+    )
     run.set_defaults(command=run_run)
 
     demo = commands.add_parser(
@@ -130,24 +147,31 @@ def run_build(options: argparse.Namespace) -> None:
 
 
 def run_info(options: argparse.Namespace) -> None:
+    if options.vtu:
+        check_folder_of(options.vtu)
     found = of_fmu(existing(options.model)) if is_fmu(options.model) else report(load(options.model))
+    if options.vtu:
+        write_ties(found, options.vtu, options.fields)
     if options.json:
         json.dump(found, sys.stdout, allow_nan=False)
         print()
     else:
         print(text(options.model, found), end="")
+        if options.vtu:
+            print(f"wrote {options.vtu}")
 
 
 def run_run(options: argparse.Namespace) -> None:
-    files = [path for path in (options.output, options.plot) if path]
+    files = [path for path in (options.output, options.plot, options.pvd) if path]
     for path in files:
         check_folder_of(path)
     if options.output:
         check_format(options.output)
     if options.plot:
         check_picture(options.plot)
-    with fmu_of(options.model) as fmu:
-        result, found = run(fmu, options.stop_time, options.step, options.input, options.model, options.output)
+    pvd = (options.pvd, options.frames) if options.pvd else None
+    with fmu_of(options.model, positions=pvd is not None) as fmu:
+        result, found = run(fmu, options.stop_time, options.step, options.input, options.model, options.output, pvd)
     if options.plot:
         plot(result, options.plot, Path(options.model).stem)
     print(

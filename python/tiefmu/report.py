@@ -10,6 +10,7 @@ from . import _core
 from .errors import UsageError
 from .scene import MOTIONS, Scene
 
+MOST_PLACES = 10_000  # masters and points whose positions the report holds: an FMU grows by 200 kB at most
 MANY_VARIABLES = 10_000  # importers read them in seconds, masters connect them in minutes
 SHOWN = 20  # slaves, masters, points and ids that the text shows; the dict has all
 
@@ -20,7 +21,7 @@ def report(scene: Scene) -> dict:
     Keys are those of the JSON. Per slave: xi, eta of the projection and its distance; d = |offset|, to the
     projection (default) or the segment's barycentre (optimized); `weights` as the tie uses them (Phi, or 1/n);
     `added`: lumped mass and inertia on each master (theory 4). A step that nothing limits is 1e30; an infinite `cond`
-    or `lambda` is null.
+    or `lambda` is null. `position`: of masters and points at the start, where they are at most MOST_PLACES.
     """
     found = scene.model.report()
     slaves, nodes = found["slaves"], found["nodes"]
@@ -110,6 +111,7 @@ def node_rows(scene: Scene, nodes: dict, master: bool) -> list[dict]:
     stiffness, added_mass = start.get("stiffness"), start.get("added_mass")
     added_inertia, rotational_stiffness = start.get("added_inertia"), start.get("rotational_stiffness")
     rows = []
+    places = rounded(nodes["position"]).tolist() if len(nodes["id"]) <= MOST_PLACES else None
     for i in np.argsort(nodes["number"], kind="stable").tolist():
         if bool(nodes["master"][i]) != master:
             continue
@@ -133,8 +135,16 @@ def node_rows(scene: Scene, nodes: dict, master: bool) -> list[dict]:
                 _core.nodal_step(float(nodes["inertia"][i]) + row["added_inertia"], row["rotational_stiffness"])
             )
         row["nodal_time_step"] = min(steps)
+        if places is not None:
+            row["position"] = places[i]
         rows.append(row)
     return rows
+
+
+def rounded(positions: np.ndarray) -> np.ndarray:
+    """Positions to 1e-7 of the scene's size, which is enough to draw it and takes half of the bytes."""
+    size = float(np.ptp(positions, axis=0).max()) if len(positions) else 0.0
+    return np.round(positions, int(np.ceil(7 - np.log10(size)))) if size > 0 else positions
 
 
 def port_rows(scene: Scene, found: dict) -> list[dict]:

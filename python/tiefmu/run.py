@@ -9,10 +9,12 @@ from typing import Any
 import numpy as np
 
 from . import key_figures
-from .errors import RunError
+from .errors import RunError, UsageError
+from .report import of_folder
 from .results import Kept, Result, writer
 from .signals import Experiment, Inputs, read_inputs
 from .slave import Fmu, Slave
+from .view.vtk import PvdFile
 
 STEPS = 500  # at least, where the caller leaves the step open
 
@@ -37,14 +39,16 @@ def run(
     inputs: Path | None = None,
     name: str | None = None,
     output: Path | None = None,
+    pvd: tuple[Path, int] | None = None,
 ) -> tuple[Result, list[str]]:
     """Runs the FMU; its outputs, and the lines of key_figures.py.
 
     stop_time, s: by default the end of the input CSV, else the FMU's default experiment. step: communication step, s,
     by default the FMU's, but so small that the run has at least STEPS. inputs: CSV with `time` and names of inputs,
     linear in between; a time given twice is a jump. name: how messages call the FMU. output: file to write all rows to
-    while it runs (results.FORMATS). Row k holds what the FMU answers at the end of step k, the inputs being those of
-    the start of the step. Raises RunError, UsageError, OSError.
+    while it runs (results.FORMATS); pvd: file and number of frames of the moving mesh (view/vtk.py).
+    Row k holds what the FMU answers at the end of step k, the inputs being those of the start of the step. Raises
+    RunError, UsageError, OSError.
     """
     fmu = Fmu(path, name)
     plan = experiment(fmu, stop_time, step, inputs)
@@ -54,11 +58,24 @@ def run(
         sinks: list[Any] = [reactions]
         if output:
             sinks.append(stack.enter_context(writer(output, outputs, {name: fmu.unit(name) for name in outputs})))
+        moving = None
+        if pvd:
+            found = of_folder(fmu.folder)
+            if found is None:
+                raise UsageError(f"{pvd[0]}: {fmu.name} was not made by tiefmu, so it does not say where its nodes are")
+            moving = PvdFile(pvd[0], fmu, found, outputs, plan, pvd[1])
+            sinks.append(moving)
         slave = Slave(fmu, outputs)
         try:
             result = simulate(slave, plan, outputs, sinks, stack.enter_context(progress(plan)))
+        except BaseException:
+            if moving:
+                moving.discard()
+            raise
         finally:
             slave.free()
+        if moving:
+            moving.close()
         return result, key_figures.lines(fmu, result, reactions, plan.step)
 
 

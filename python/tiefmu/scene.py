@@ -7,6 +7,7 @@ over all nodes of the mesh, in SI. Search and mechanics are checked by the solve
 import os
 import re
 import sys
+from collections.abc import Sequence
 from enum import Enum
 from pathlib import Path
 
@@ -51,11 +52,12 @@ class Scene:
         return _core.Simulation(self.model)
 
 
-def load(source) -> Scene:
+def load(source, expose: Sequence[str] = ()) -> Scene:
     """Reads, checks and compiles a scene.
 
     source: path of a TOML file or of a deck (decks/), or a dict of the same shape (NumPy arrays may stand for lists;
-    messages call it "scene"; a mesh file is taken relative to the current folder). Raises SceneError, one line
+    messages call it "scene"; a mesh file is taken relative to the current folder). expose: added to [interface] expose
+    of a TOML file or a dict. Raises SceneError, one line
     "FILE: table: id: message", on the first thing that is wrong.
     """
     if isinstance(source, dict):
@@ -66,7 +68,9 @@ def load(source) -> Scene:
             return decks.load(Path(source))
     try:
         raw = plain(source) if isinstance(source, dict) else read_toml(Path(source))
-        return Scene(file, name, schema.parse(raw), folder)
+        tables = schema.parse(raw)
+        tables.interface.expose += [name for name in expose if name not in tables.interface.expose]
+        return Scene(file, name, tables, folder)
     except SceneError as error:
         raise SceneError(one_line(f"{file}: {error}")) from None
 
