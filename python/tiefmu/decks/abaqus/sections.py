@@ -121,7 +121,8 @@ class Sections:
             thickness, material = self.layers(block, 1)
             return values | {"thickness": thickness}, material
         if block.key == "SHELLGENERALSECTION" and not block.get("MATERIAL"):
-            return values | self.general(block)
+            thickness, material = self.general(block)
+            return values | {"thickness": thickness}, material
         data = block.data()
         values["thickness"] = beams.positive(block, data, 0, "thickness")
         for option in ("NODALTHICKNESS", "SHELLTHICKNESS"):
@@ -132,7 +133,7 @@ class Sections:
                 )
         return values, self.material(block, block.get("MATERIAL"))
 
-    def general(self, block: Block):
+    def general(self, block: Block) -> tuple[float, int]:
         """A section given by its stiffness: mass per area by DENSITY, no stiffness."""
         per_area = block.numbers(0, [block.get("DENSITY")])[0] if block.get("DENSITY") else 0.0
         self.deck.warn(
@@ -142,7 +143,7 @@ class Sections:
         thin = 1e-6
         number = max(self.deck.materials) + 1
         self.deck.materials[number] = Material(number, density=per_area / thin, void=True, where=block.where)
-        return {"thickness": thin}, number
+        return thin, number
 
     def layers(self, block: Block, thickness_at: int) -> tuple[float, int]:
         """Total thickness of a composite, and a material of the mean density and the largest modulus of its layers."""
