@@ -24,7 +24,8 @@ def settle(deck: Deck, written: Written, scene):
         drop(deck, written, name, ids[near])
         if pair["adjust"]:
             gap = thick[1] * (0.0 if pair["onto_middle"] else pair["share"] * pair["factor"] / written.unit)
-            move(deck, written, name, {key: found[key][mine[near]] for key in ("id", "nodes", "weights")}, gap[near])
+            keys = ("id", "nodes", "corners", "xi", "eta", "weights")
+            move(deck, written, name, {key: found[key][mine[near]] for key in keys}, gap[near])
     written.pairwise = {}
 
 
@@ -57,7 +58,7 @@ def move(deck: Deck, written: Written, name: str, slaves: dict[str, np.ndarray],
     """Moves slaves along the line to their projections until they are `gap` away; those on the surface stay."""
     order = np.argsort(written.node_id)
     nodes = order[np.searchsorted(written.node_id, np.maximum(slaves["nodes"], written.node_id.min()), sorter=order)]
-    foot = (slaves["weights"][:, :, None] * written.position[nodes]).sum(axis=1)
+    foot = (inside(slaves)[:, :, None] * written.position[nodes]).sum(axis=1)
     index = order[np.searchsorted(written.node_id, slaves["id"], sorter=order)]
     arm = written.position[index] - foot
     distance = np.linalg.norm(arm, axis=1)
@@ -73,3 +74,14 @@ def move(deck: Deck, written: Written, name: str, slaves: dict[str, np.ndarray],
         f"tie '{name}': {moved.sum()} slaves are moved to the surface, node {slaves['id'][moved][worst]} the "
         f"farthest, by {far[worst]:.4g}"
     )
+
+
+def inside(slaves: dict[str, np.ndarray]) -> np.ndarray:
+    """Shape functions (n, 4) at the projections, those beside their segment taken to its edge."""
+    xi, eta = (np.clip(slaves[key], -1, 1) for key in ("xi", "eta"))
+    quad = (
+        np.stack([(1 - xi) * (1 - eta), (1 + xi) * (1 - eta), (1 + xi) * (1 + eta), (1 - xi) * (1 + eta)], axis=1) / 4
+    )
+    triangle = np.where(np.arange(4) < 3, np.maximum(slaves["weights"], 0), 0)
+    triangle = triangle / np.maximum(triangle.sum(axis=1, keepdims=True), 1e-300)
+    return np.where(slaves["corners"][:, None] == 4, quad, triangle)
