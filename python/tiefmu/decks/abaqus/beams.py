@@ -103,7 +103,8 @@ def general(sections, block: Block, values: list[float]) -> tuple[dict, int]:
     else:
         area = positive(block, values, 0, "area")
         i11, _, i22, j = (values[1:] + [0.0] * 4)[:4]
-    young, shear = (block.data(2) + [0.0, 0.0])[:2]
+    moduli = block.data(2) or (block.data(1) if len(block.data(1)) <= 2 else [])  # the line of axes may be blank
+    young, shear = (moduli + [0.0, 0.0])[:2]
     density = block.numbers(0, [block.get("DENSITY")])[0] if block.get("DENSITY") else 0.0
     if not (density >= 0 and young >= 0 and shear >= 0):
         block.fail("a density or a modulus is negative")

@@ -59,7 +59,7 @@ def part_of(source: Source, block: Block, kind: str, frames: dict[str, int]) -> 
     axis = 0 if kind in AXIAL else freedom(source, block, kind)
     if axis is None:
         return 0
-    size = coefficient(source, block)
+    size = coefficient(source, block, 0 if kind in AXIAL else 1)
     values = {"mass": 0.0, "inertia": 0.0, "type": "axial", "turning": False}
     vectors = {name: np.zeros(3) for name in ("stiffness", "damping", "rotational_stiffness", "rotational_damping")}
     vectors[("rotational_" if axis >= 3 else "") + ("stiffness" if block.key == "SPRING" else "damping")][axis % 3] = (
@@ -90,15 +90,16 @@ def freedom(source: Source, block: Block, kind: str) -> int | None:
     return freedoms[0] - 1
 
 
-def coefficient(source: Source, block: Block) -> float:
-    """Stiffness or damping; of a nonlinear one its slope at rest."""
+def coefficient(source: Source, block: Block, first: int) -> float:
+    """Stiffness or damping; of a nonlinear one its slope at rest. first: of the data lines that are not blank; blank
+    is the line of the degrees of freedom of axial ones."""
+    lines = [line for line, items in block.rows() if any(items)][first:]
     if not block.has("NONLINEAR"):
-        row = block.data(1)
-        if not row:
+        if not lines:
             block.fail("has no stiffness" if block.key == "SPRING" else "has no damping")
-        value = row[0]
+        value = block.data(lines[0])[0]
     else:
-        points = np.array([(block.data(line) + [0.0, 0.0])[:2] for line in range(1, len(block.lines))])
+        points = np.array([(block.data(line) + [0.0, 0.0])[:2] for line in lines])
         if len(points) < 2:
             block.fail("expected at least two points of force and displacement")
         points = points[np.argsort(points[:, 1], kind="stable")]
