@@ -115,7 +115,7 @@ def test_adjust_moves_slaves_to_the_surface(tmp_path):
     at = dict(zip(found.scene.node_id.tolist(), found.scene.position.tolist()))
     assert at[21] == pytest.approx([0.5, 0.5, 0], abs=1e-15) and at[24] == pytest.approx([0.5, 0.5, 0], abs=1e-15)
     assert at[23] == pytest.approx([2, 0.2, 0], abs=1e-12)  # beside the surface: to its edge
-    assert any("are moved to the surface (ADJUST), node 24 the farthest, by 0.4" in line for line in found.deck.notes)
+    assert any("are moved to the surface, node 24 the farthest, by 0.4" in line for line in found.deck.notes)
 
 
 def test_adjust_leaves_room_for_the_thickness(tmp_path):
