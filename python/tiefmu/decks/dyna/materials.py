@@ -38,6 +38,7 @@ YOUNG_ONLY = {57, 83}
 MODULI = {2, 22, 34, 54, 55, 58, 59}  # three moduli, then PRBA
 SHEAR_BULK = {5: "GK", 6: "KG", 12: "G  K", 13: "G  K", 187: "KG"}  # which fields behind RO are G and K
 NO_STIFFNESS = {9, 138, 184, 185, 186, 240}  # null material, cohesive zones
+NOT_READ = {4, 8, 11, 14, 72, 76, 77, 127, 159, 181}  # whose first cards hold no moduli that stand for E and nu
 SPRINGS = {
     "SPRING_ELASTIC": "S01", "DAMPER_VISCOUS": "S02", "SPRING_ELASTOPLASTIC": "S03", "SPRING_NONLINEAR_ELASTIC": "S04",
     "DAMPER_NONLINEAR_VISCOUS": "S05", "SPRING_GENERAL_NONLINEAR": "S06", "SPRING_MAXWELL": "S07",
@@ -137,7 +138,7 @@ def constants(deck, found: Materials, block: Block, first: int, material: Materi
         translations_rotations(found, block, first, material.id)
     elif law in (67, 68, 69, 71, 74):
         pass
-    elif law is None and a[0] > 0 and 0 <= a[1] < 0.5:
+    elif law not in NOT_READ and a[0] > 0 and 0 <= a[1] < 0.5:
         material.young, material.poisson = a[0], a[1]
         deck.warn(
             f"{block.where}: is not known; its third and fourth field are taken as Young's modulus {a[0]:g} and "

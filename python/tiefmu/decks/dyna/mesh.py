@@ -130,6 +130,13 @@ def extra_cards(block: Block, keyword: str) -> int:
     return sum(count for word, count in MORE[keyword].items() if block.has(word))
 
 
+def ends_at(block: Block, card: int, count: int) -> bool:
+    """Whether the fields of an element's card behind the first `count` are blank or 0."""
+    line = block.need(card)
+    rest = line.split(b",")[count:10] if b"," in line else [line[count * block.width("I") : 10 * block.width("I")]]
+    return not b"".join(rest).strip(b" 0\t\r")
+
+
 def shells(deck: Deck, block: Block, found: Collected):
     """*ELEMENT_SHELL: corners; the mean thickness of the corners with _THICKNESS, _BETA or _MCID."""
     more, thick = extra_cards(block, "ELEMENT_SHELL"), block.has(*THICK)
@@ -137,16 +144,13 @@ def shells(deck: Deck, block: Block, found: Collected):
     if step == 1:
         columns, cards = block.table("I" * 10)
     else:
-        cards = np.arange(0, end, step)
+        where, card = [], 0
+        while card < end:
+            where.append(card)
+            card += step + (thick and not ends_at(block, card, 6))  # a card more where mid-side nodes are given
+        cards = np.array(where, np.int64)
         columns, _ = block.table("I" * 10, cards)
-        if thick and any(column.any() for column in columns[6:]):  # a card more where mid-side nodes are given
-            where, card = [], 0
-            while card < end:
-                where.append(card)
-                card += step + any(block.read(card, "I" * 10)[6:])
-            cards = np.array(where)
-            columns, _ = block.table("I" * 10, cards)
-        if len(cards) and cards[-1] + thick >= len(block.lines):
+        if thick and len(cards) and cards[-1] + 1 >= len(block.lines):
             block.fail("is cut off: its last element has no thickness", int(cards[-1]))
     if any(column.any() for column in columns[6:]):
         deck.warn(f"{block.where}: mid-side nodes are left aside; shells have the mass of their corners")
@@ -172,25 +176,32 @@ def solids(deck: Deck, block: Block, found: Collected):
     keyword = "ELEMENT_TSHELL" if block.name.startswith("ELEMENT_TSHELL") else "ELEMENT_SOLID"
     more = extra_cards(block, keyword)
     if more:
-        columns, cards = block.table("I" * 10, range(block.end))
+        first, body, card = [], [], 0
+        while card < block.end:
+            first.append(card)
+            card += ends_at(block, card, 2)
+            body.append(card)
+            card += 1 + more
+        columns, cards = block.table("I" * 10, sorted({*first, *body}))
+        heads, bodies = np.searchsorted(cards, first), np.searchsorted(cards, body)
+        rows = np.stack(columns, axis=1)
     else:
         columns, cards = block.table("I" * 10)
-    rows = np.stack(columns, axis=1)
+        rows = np.stack(columns, axis=1)
+        heads = bodies = np.arange(len(rows))
+        alone = np.asarray(~rows[:, 2:].any(axis=1))
+        if alone.any():
+            first, body, row = [], [], 0
+            while row < len(rows):
+                first.append(row)
+                row += int(alone[row])
+                body.append(row)
+                row += 1
+            if body[-1] >= len(rows):
+                block.fail("is cut off: the last element has no nodes", int(cards[-1]))
+            heads, bodies = np.array(first), np.array(body)
     if not len(rows):
         return
-    short = ~rows[:, 2:].any(axis=1)
-    heads = bodies = np.arange(len(rows))
-    if short.any() or more:
-        alone = np.asarray(short).tolist()
-        first, body, row = [], [], 0
-        while row < len(rows):
-            first.append(row)
-            row += int(alone[row])
-            body.append(row)
-            row += 1 + more
-        if body[-1] >= len(rows):
-            block.fail("is cut off: the last element has no nodes", int(cards[-1]))
-        heads, bodies = np.array(first), np.array(body)
     two = heads != bodies
     ids, part = rows[heads, 0] + block.origin.element, rows[heads, 1] + block.origin.part
     nodes = np.zeros((len(heads), 10), np.int64)
