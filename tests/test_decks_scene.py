@@ -13,6 +13,8 @@ from tiefmu.package import build
 from tiefmu.report import report
 
 HERE = Path(__file__).parent
+FOLDERS = (HERE / "decks", HERE.parent / "scenes")
+DECKS = sorted(path for folder in FOLDERS for path in folder.iterdir() if decks.is_deck(path))
 PLATE = {1: (0, 0, 0), 2: (2, 0, 0), 3: (2, 1, 0), 4: (0, 1, 0)}
 PIN = {11: (0.5, 0.5, 0.1), 12: (0.5, 0.5, 0.4), 13: (1.5, 0.5, 0.1)}
 
@@ -306,7 +308,7 @@ def test_a_built_deck_runs_in_fmpy(tmp_path):
     run_in_fmpy(everything().write(tmp_path / "deck_0000.rad"), tmp_path)
 
 
-@pytest.mark.parametrize("path", sorted([*(HERE / "decks").glob("*.rad"), *(HERE.parent / "scenes").glob("*.rad")]))
+@pytest.mark.parametrize("path", DECKS)
 def test_decks_of_the_repository_run_in_fmpy(tmp_path, path):
     decks.import_deck(path, tmp_path / "scene.toml")
     assert report(scene.load(tmp_path / "scene.toml"))["slaves"] == report(scene.load(path))["slaves"]

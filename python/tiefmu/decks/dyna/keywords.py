@@ -61,7 +61,10 @@ MATTERS = {
     "PART_STACKED_ELEMENTS": "its parts are left out",
     "SPECIAL": "is not read",
 }
-EXACT = {"NODE", "ELEMENT_MASS", "LOAD_BODY_X", "LOAD_BODY_Y", "LOAD_BODY_Z"}  # used without words behind only
+EXACT = {  # used without words behind only
+    "NODE", "ELEMENT_MASS", "LOAD_BODY_X", "LOAD_BODY_Y", "LOAD_BODY_Z", "INCLUDE", "INCLUDE_TRANSFORM", "INCLUDE_PATH",
+    "PARAMETER",
+}  # fmt: skip
 EVERY: dict[str, tuple[str, str]] = {
     **{key: ("matters", what) for key, what in MATTERS.items()},
     **{key: ("safe", why) for why, keys in SAFE.items() for key in keys},

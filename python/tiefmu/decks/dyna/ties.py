@@ -6,7 +6,7 @@ import numpy as np
 
 from ..model import SHELLS, Deck, Faces, Tie
 from ..selected import Selected
-from .cards import Block
+from .cards import Block, integer
 from .sets import Sets
 from .tables import Tables
 
@@ -63,6 +63,19 @@ def bare(block: Block) -> str:
     return "_".join(word for word in words if word != "MPP")
 
 
+def headed(block: Block, card: int) -> tuple[int, str]:
+    """Id and heading of a card; a heading may hold commas of its own."""
+    line, width = block.need(card), block.width("i")
+    first, comma, rest = line.partition(b",")
+    if not comma or len(first) > width:
+        first, rest = line[:width], line[width:]
+    try:
+        number = integer(first.decode("latin-1").strip())
+    except ValueError:
+        block.refuse(card, "i", 0, first.decode("latin-1").strip())
+    return number, rest.decode("utf-8", "replace").strip()
+
+
 class Contact:
     """The cards of one contact: title, sides, thicknesses."""
 
@@ -71,13 +84,8 @@ class Contact:
         card = 0
         self.number, self.title = order, ""
         if block.has("ID", "TITLE"):
-            self.number = block.read(0, "i")[0] or order
-            line = block.text(0)
-            self.title = (
-                line.partition(",")[2].strip()
-                if "," in line[:11]
-                else block.lines[0][block.width("i") :].decode("utf-8", "replace").strip()
-            )
+            self.number, self.title = headed(block, 0)
+            self.number = self.number or order
             card = 1
         if block.has("MPP"):
             card += 1
