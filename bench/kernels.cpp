@@ -20,7 +20,6 @@
 #include <vector>
 
 #include "compile.hpp"
-#include "ordering.hpp"
 #include "search.hpp"
 #include "simulation.hpp"
 #include "timing.hpp"
@@ -184,13 +183,10 @@ void search(int slaves, bool shuffled) {
         [&] {
           found = 0;
           const SegmentSearch search(scene.nodes.position, scene.segments.nodes, scene.segments.id);
-          const double edge = search.rootMeanSquareEdge(), diagonal = search.longestDiagonal();
           std::vector<Vec3> places;  // as bindSlaves does it
-          for (int s : wanted) places.push_back(scene.nodes.position[s]);
-          for (int k : localOrder(places)) {
-            const Vec3& x = places[k];
-            found += (method == SearchMethod::box ? search.box(x, edge) : search.nearestNode(x, diagonal)).segment >= 0;
-          }
+          for (int k : wanted) places.push_back(scene.nodes.position[k]);
+          search.each(method, places, search.defaultReach(method),
+                      [&](int, const Match& match) { found += match.segment >= 0; });
         },
         2);
     if (found != wanted.size()) std::exit(1);

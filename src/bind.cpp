@@ -2,7 +2,6 @@
 
 #include <algorithm>
 
-#include "ordering.hpp"
 #include "scene_view.hpp"
 #include "search.hpp"
 
@@ -66,26 +65,22 @@ class Binder : SceneView {
     for (int k : search.zeroArea())
       warn(tie(t) + "segment " + segmentId(spec.segments[k]) +
            ": has no area (its nodes coincide, are collinear or fold onto each other); passed over");
-    const bool box = spec.search == SearchMethod::box;
-    const double byDefault = box ? search.rootMeanSquareEdge() : search.longestDiagonal();
-    const double reach = spec.searchDistance > 0 ? spec.searchDistance : byDefault;
+    const double reach = spec.searchDistance > 0 ? spec.searchDistance : search.defaultReach(spec.search);
     model.searchDistance.push_back(reach);
 
-    // Along a curve, so that what one slave reads is still at hand for the next; told in the order of the tie.
     std::vector<Vec3> places;
     places.reserve(count);
     for (int s : spec.slaves) places.push_back(scene.nodes.position[s]);
     std::vector<Bond> found(count);
-    std::vector<std::pair<int, Match>> toTell;
-    for (int k : localOrder(places)) {
-      Match match = box ? search.box(places[k], reach) : search.nearestNode(places[k], reach);
+    std::vector<std::pair<int, Match>> toTell;  // in the order of the tie
+    search.each(spec.search, places, reach, [&](int k, Match& match) {
       const int e = match.segment < 0 ? -1 : spec.segments[match.segment];
       if (e < 0 || match.rival >= 0 || match.folded >= 0 || match.projection.outside > SegmentSearch::warnOutside)
         toTell.emplace_back(k, match);
       if (e >= 0) withoutNoise(e, places[k], match.projection);
       found[k] = {spec.slaves[k],         t, e, e < 0 ? 0 : corners(e), Coupling::translation, match.projection,
                   match.projection.offset};
-    }
+    });
     std::sort(toTell.begin(), toTell.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
     std::vector<int> used;
     for (const auto& [k, match] : toTell) {

@@ -1,17 +1,9 @@
 #include "ordering.hpp"
 
-#include <algorithm>
-#include <cstdint>
 #include <numeric>
 
 namespace tiefmu {
 namespace {
-
-double walk(const std::vector<Vec3>& points, const std::vector<int>& order) {
-  double length = 0;
-  for (std::size_t k = 1; k < order.size(); ++k) length += (points[order[k]] - points[order[k - 1]]).norm();
-  return length;
-}
 
 // Bits of a 21-bit number, two zeros after each.
 std::uint64_t spread(std::uint64_t x) {
@@ -25,24 +17,35 @@ std::uint64_t spread(std::uint64_t x) {
 }  // namespace
 
 std::vector<int> localOrder(const std::vector<Vec3>& points) {
-  std::vector<int> given(points.size());
-  std::iota(given.begin(), given.end(), 0);
-  if (points.size() < 3) return given;
+  std::vector<int> order(points.size());
+  std::iota(order.begin(), order.end(), 0);
+  if (points.size() < 3) return order;
   Vec3 low = points[0], high = points[0];
-  for (const Vec3& x : points) {
-    low = low.cwiseMin(x);
-    high = high.cwiseMax(x);
+  double given = 0;  // how far it is from point to point
+  for (std::size_t k = 1; k < points.size(); ++k) {
+    low = low.cwiseMin(points[k]);
+    high = high.cwiseMax(points[k]);
+    given += (points[k] - points[k - 1]).norm();
   }
   const double size = (high - low).maxCoeff(), scale = size > 0 ? ((1 << 21) - 1) / size : 0;
-  std::vector<std::uint64_t> code(points.size());
-  for (std::size_t k = 0; k < points.size(); ++k) {
+  struct Coded {
+    std::uint64_t key;
+    int index;
+  };
+  std::vector<Coded> coded(points.size());
+  for (int k = 0; k < static_cast<int>(points.size()); ++k) {
     const Vec3 x = scale * (points[k] - low);
-    code[k] = spread(static_cast<std::uint64_t>(x[0])) | spread(static_cast<std::uint64_t>(x[1])) << 1 |
-              spread(static_cast<std::uint64_t>(x[2])) << 2;
+    coded[k].key = spread(static_cast<std::uint64_t>(x[0])) | spread(static_cast<std::uint64_t>(x[1])) << 1 |
+                   spread(static_cast<std::uint64_t>(x[2])) << 2;
+    coded[k].index = k;
   }
-  std::vector<int> order = given;
-  std::sort(order.begin(), order.end(), [&](int a, int b) { return code[a] != code[b] ? code[a] < code[b] : a < b; });
-  return walk(points, given) <= 4 * walk(points, order) ? given : order;
+  sortByKey(coded);
+  double curve = 0;
+  for (std::size_t k = 1; k < coded.size() && given > 4 * curve; ++k)
+    curve += (points[coded[k].index] - points[coded[k - 1].index]).norm();
+  if (given > 4 * curve)
+    for (std::size_t k = 0; k < coded.size(); ++k) order[k] = coded[k].index;
+  return order;
 }
 
 }  // namespace tiefmu

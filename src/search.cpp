@@ -2,8 +2,9 @@
 
 #include <algorithm>
 #include <limits>
-#include <numeric>
 #include <utility>
+
+#include "ordering.hpp"
 
 namespace tiefmu {
 namespace {
@@ -11,149 +12,66 @@ namespace {
 // Distances that differ by less (of the mean edge, or what the rounding of coordinates leaves) are equal: then the tie
 // rule decides, so that the answer does not hang on the frame or the order of the input.
 constexpr double roundoff = 1e-10;
-constexpr int leaf = 4;           // items of a box that is not divided
 constexpr double hanging = 1e-2;  // of a segment's longest diagonal: a node as near to it counts as on it
 
-double distance2(const Vec3& low, const Vec3& high, const Vec3& s) {
-  return (low - s).cwiseMax(s - high).cwiseMax(0.0).squaredNorm();
+Box boxOf(int n, const Vec3* corner) {
+  Box box{corner[0], corner[0]};
+  for (int i = 1; i < n; ++i) {
+    box.low = box.low.cwiseMin(corner[i]);
+    box.high = box.high.cwiseMax(corner[i]);
+  }
+  return box;
 }
 
 }  // namespace
 
-void SegmentSearch::Tree::build(std::vector<Box> boxes) {
-  boxes_ = std::move(boxes);
-  items_.resize(boxes_.size());
-  std::iota(items_.begin(), items_.end(), 0);
-  nodes_.clear();
-  if (items_.empty()) return;
-  nodes_.reserve(boxes_.size());
-  nodes_.emplace_back();
-  split(0, 0, static_cast<int>(items_.size()));
-  boxes.clear();
-  for (int i : items_) boxes.push_back(boxes_[i]);
-  boxes_ = std::move(boxes);
-}
-
-void SegmentSearch::Tree::split(int node, int first, int last) {
-  Box box = boxes_[items_[first]];
-  for (int i = first + 1; i < last; ++i) {
-    box.low = box.low.cwiseMin(boxes_[items_[i]].low);
-    box.high = box.high.cwiseMax(boxes_[items_[i]].high);
-  }
-  nodes_[node] = {box, first, last - first};
-  if (last - first <= leaf) return;
-  int axis;
-  (box.high - box.low).maxCoeff(&axis);
-  const int middle = (first + last) / 2;
-  std::nth_element(items_.begin() + first, items_.begin() + middle, items_.begin() + last, [&](int a, int b) {
-    return boxes_[a].low[axis] + boxes_[a].high[axis] < boxes_[b].low[axis] + boxes_[b].high[axis];
-  });
-  const int child = static_cast<int>(nodes_.size());
-  nodes_.emplace_back();
-  nodes_.emplace_back();
-  nodes_[node].first = child;
-  nodes_[node].count = 0;
-  split(child, first, middle);
-  split(child + 1, middle, last);
-}
-
-template <class Limit, class Visit> void SegmentSearch::Tree::visit(const Vec3& s, Limit limit, Visit visit) const {
-  if (nodes_.empty()) return;
-  std::pair<int, double> stack[128];  // median splits: depth below 64
-  int depth = 0;
-  stack[depth++] = {0, distance2(nodes_[0].box.low, nodes_[0].box.high, s)};
-  while (depth > 0) {
-    const auto [index, d2] = stack[--depth];
-    const double l = limit();
-    if (d2 > l * l) continue;
-    const Node& node = nodes_[index];
-    if (node.count > 0) {
-      std::pair<double, int> near[leaf];
-      for (int i = 0; i < node.count; ++i) {
-        const Box& box = boxes_[node.first + i];
-        near[i] = {distance2(box.low, box.high, s), node.first + i};
-        for (int k = i; k > 0 && near[k] < near[k - 1]; --k) std::swap(near[k], near[k - 1]);
-      }
-      for (int i = 0; i < node.count; ++i) {
-        const double within = limit();
-        if (near[i].first <= within * within) visit(near[i].second);
-      }
-      continue;
-    }
-    const Box &a = nodes_[node.first].box, &b = nodes_[node.first + 1].box;
-    const double da = distance2(a.low, a.high, s), db = distance2(b.low, b.high, s);
-    // nearer child on top of the stack
-    stack[depth++] = da < db ? std::pair{node.first + 1, db} : std::pair{node.first, da};
-    stack[depth++] = da < db ? std::pair{node.first, da} : std::pair{node.first + 1, db};
-  }
-}
-
 SegmentSearch::SegmentSearch(const std::vector<Vec3>& position, std::vector<std::array<int, 4>> segments,
                              std::vector<std::int64_t> ids)
     : ids_(std::move(ids)) {
-  std::vector<Box> boxes;
-  std::vector<std::pair<int, int>> edges;
-  std::vector<int> usable;
-  Vec3 x[4];
-  const auto corners = [&](int e) {
-    const int n = segments[e][3] < 0 ? 3 : 4;
-    for (int i = 0; i < n; ++i) x[i] = position[segments[e][i]];
-    return n;
+  struct Edge {
+    std::uint64_t key;  // of its nodes, the lower one first
+    double length2;
   };
+  std::vector<Edge> edges;
+  std::vector<Segment> usable;
+  std::vector<Box> boxes;
+  edges.reserve(4 * segments.size());
+  usable.reserve(segments.size());
+  boxes.reserve(segments.size());
   for (int e = 0; e < static_cast<int>(segments.size()); ++e) {
-    const int n = corners(e);
-    Box box{x[0], x[0]};
+    const std::array<int, 4>& node = segments[e];
+    const int n = node[3] < 0 ? 3 : 4;
+    Segment segment{{}, e, n, false};
+    Vec3* x = segment.x;
+    for (int i = 0; i < n; ++i) x[i] = position[node[i]];
     for (int i = 0; i < n; ++i) {
-      box.low = box.low.cwiseMin(x[i]);
-      box.high = box.high.cwiseMax(x[i]);
-      const auto ends = std::minmax(segments[e][i], segments[e][(i + 1) % n]);
-      edges.emplace_back(ends.first, ends.second);
+      const int next = (i + 1) % n;
+      const auto [low, high] = std::minmax(node[i], node[next]);
+      edges.push_back(
+          {static_cast<std::uint64_t>(low) << 32 | static_cast<std::uint64_t>(high), (x[next] - x[i]).squaredNorm()});
       for (int j = 0; j < i; ++j) diagonal_ = std::max(diagonal_, (x[i] - x[j]).squaredNorm());
     }
-    const bool crossing = crossesItself(n, x);
-    if (crossing) crossing_.push_back(e);
-    if (!crossing && tiefmu::zeroArea(n, x)) {
+    segment.crossing = crossesItself(n, x);
+    if (segment.crossing) crossing_.push_back(e);
+    if (!segment.crossing && tiefmu::zeroArea(n, x)) {
       zeroArea_.push_back(e);
       continue;
     }
-    farthest_ = std::max({farthest_, box.low.cwiseAbs().maxCoeff(), box.high.cwiseAbs().maxCoeff()});
-    usable.push_back(e);
-    boxes.push_back(box);
+    boxes.push_back(boxOf(n, x));
+    farthest_ = std::max({farthest_, boxes.back().low.cwiseAbs().maxCoeff(), boxes.back().high.cwiseAbs().maxCoeff()});
+    usable.push_back(segment);
   }
   diagonal_ = std::sqrt(diagonal_);
-  std::sort(edges.begin(), edges.end());
-  edges.erase(std::unique(edges.begin(), edges.end()), edges.end());
-  for (const auto& [a, b] : edges) edge_ += (position[a] - position[b]).squaredNorm();
-  edge_ = edges.empty() ? 0 : std::sqrt(edge_ / static_cast<double>(edges.size()));
-  segmentTree_.build(std::move(boxes));
-
-  std::vector<std::pair<int, int>> holders;  // node, place
+  sortByKey(edges);
+  std::size_t count = 0;
+  for (std::size_t k = 0; k < edges.size(); ++k) {
+    if (k > 0 && edges[k].key == edges[k - 1].key) continue;
+    edge_ += edges[k].length2;
+    ++count;
+  }
+  edge_ = count == 0 ? 0 : std::sqrt(edge_ / static_cast<double>(count));
   segments_.reserve(usable.size());
-  for (int item : segmentTree_.items()) {
-    const int e = usable[item], n = corners(e), place = static_cast<int>(segments_.size());
-    Segment segment{{x[0], x[1], x[2], n == 4 ? x[3] : x[0]}, e, n, crossesItself(n, x)};
-    segments_.push_back(segment);
-    for (int i = 0; i < n; ++i) holders.emplace_back(segments[e][i], place);
-  }
-  std::sort(holders.begin(), holders.end());
-  std::vector<int> nodes, begin;
-  std::vector<Box> points;
-  for (int k = 0; k < static_cast<int>(holders.size()); ++k) {
-    const int node = holders[k].first;
-    if (!nodes.empty() && nodes.back() == node) continue;
-    nodes.push_back(node);
-    begin.push_back(k);
-    points.push_back({position[node], position[node]});
-  }
-  begin.push_back(static_cast<int>(holders.size()));
-  nodeTree_.build(std::move(points));
-  holders_.reserve(holders.size());
-  for (int item : nodeTree_.items()) {
-    points_.push_back(position[nodes[item]]);
-    holdersBegin_.push_back(static_cast<int>(holders_.size()));
-    for (int k = begin[item]; k < begin[item + 1]; ++k) holders_.push_back(holders[k].second);
-  }
-  holdersBegin_.push_back(static_cast<int>(holders_.size()));
+  for (int k : tree_.build(boxes)) segments_.push_back(usable[k]);
 }
 
 double SegmentSearch::noise(const Vec3& slave) const {
@@ -216,10 +134,23 @@ Match SegmentSearch::decide(const Candidates& c) const {
   return match;
 }
 
+// What one slave reads is still at hand for the next; slaves are copied first, as reading them far apart waits less so.
+void SegmentSearch::each(SearchMethod by, const std::vector<Vec3>& slaves, double reach,
+                         const std::function<void(int, Match&)>& take) const {
+  const std::vector<int> order = localOrder(slaves);
+  std::vector<Vec3> places;
+  places.reserve(order.size());
+  for (int k : order) places.push_back(slaves[k]);
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    Match match = by == SearchMethod::box ? box(places[i], reach) : nearestNode(places[i], reach);
+    take(order[i], match);
+  }
+}
+
 Match SegmentSearch::box(const Vec3& slave, double reach) const {
   const double tolerance = noise(slave), infinity = std::numeric_limits<double>::infinity();
   Candidates c{tolerance, reach, infinity, infinity, {}};
-  segmentTree_.visit(slave, [&] { return c.within(); }, [&](int place) { consider(place, slave, c); });
+  tree_.visit(slave, [&] { return c.within(); }, [&](int place) { consider(place, slave, c); });
   const double within = reach * (1 + roundoff) + tolerance;
   std::erase_if(c.usable, [&](const auto& candidate) { return candidate.second.nearest > within; });
   if (c.crossing > within) c.crossingPlace = -1;
@@ -230,48 +161,71 @@ Match SegmentSearch::box(const Vec3& slave, double reach) const {
 Match SegmentSearch::nearestNode(const Vec3& slave, double reach) const {
   const double tolerance = noise(slave), infinity = std::numeric_limits<double>::infinity();
   double nearest = reach;
-  std::vector<std::pair<double, int>> points;
   const auto limit = [&] { return nearest * (1 + roundoff) + tolerance; };
-  nodeTree_.visit(slave, limit, [&](int i) {
-    const double distance = (points_[i] - slave).norm();
+  std::vector<std::pair<double, int>> holders;  // distance of the nearest corner, place
+  tree_.visit(slave, limit, [&](int place) {
+    const Segment& segment = segments_[place];
+    double distance2 = infinity;
+    for (int i = 0; i < segment.corners; ++i) distance2 = std::min(distance2, (segment.x[i] - slave).squaredNorm());
+    const double distance = std::sqrt(distance2);
     if (distance > limit()) return;
     nearest = std::min(nearest, distance);
-    points.emplace_back(distance, i);
+    holders.emplace_back(distance, place);
   });
-  std::erase_if(points, [&](const auto& point) { return point.first > limit(); });
+  std::erase_if(holders, [&](const auto& holder) { return holder.first > limit(); });
   Candidates c{tolerance, infinity, infinity, infinity, {}};
-  for (const auto& [distance, i] : points)
-    for (int k = holdersBegin_[i]; k < holdersBegin_[i + 1]; ++k) consider(holders_[k], slave, c);
+  for (auto& [order, place] : holders) order = boxOf(segments_[place].corners, segments_[place].x).distance2(slave);
+  std::sort(holders.begin(), holders.end());
+  for (const auto& [distance2, place] : holders)
+    if (distance2 <= c.within() * c.within()) consider(place, slave, c);
+  std::erase_if(c.usable, [&](const auto& candidate) { return candidate.second.nearest > c.within(); });
   const auto inside = [&](const auto& candidate) { return candidate.second.outside <= 1 + roundoff; };
-  if (std::none_of(c.usable.begin(), c.usable.end(), inside))
-    for (const auto& [distance, i] : points)
-      segmentTree_.visit(
-          points_[i], [&] { return hanging * diagonal_; },
-          [&](int place) {
-            const Segment& segment = segments_[place];
-            double size = 0;
-            for (int k = 1; k < segment.corners; ++k) size = std::max(size, (segment.x[k] - segment.x[0]).norm());
-            if (project(segment.corners, segment.x, points_[i]).nearest <= hanging * size) consider(place, slave, c);
-          });
+  if (std::none_of(c.usable.begin(), c.usable.end(), inside)) hangingAt(slave, limit(), holders, c);
   return decide(c);
 }
 
+// Segments on whose edge a node of the holders hangs that is no farther than `limit` from the slave.
+void SegmentSearch::hangingAt(const Vec3& slave, double limit, const std::vector<std::pair<double, int>>& holders,
+                              Candidates& c) const {
+  std::vector<Vec3> points;
+  for (const auto& [distance2, place] : holders)
+    for (int i = 0; i < segments_[place].corners; ++i) {
+      const Vec3& x = segments_[place].x[i];
+      if ((x - slave).norm() <= limit && std::find(points.begin(), points.end(), x) == points.end())
+        points.push_back(x);
+    }
+  for (const Vec3& point : points)
+    tree_.visit(
+        point, [&] { return hanging * diagonal_; },
+        [&](int place) {
+          const Segment& segment = segments_[place];
+          double size = 0;
+          for (int k = 1; k < segment.corners; ++k) size = std::max(size, (segment.x[k] - segment.x[0]).norm());
+          if (project(segment.corners, segment.x, point).nearest <= hanging * size) consider(place, slave, c);
+        });
+}
+
 Match SegmentSearch::nearest(const Vec3& slave) const {
-  Match match;
   const double tolerance = noise(slave);
-  segmentTree_.visit(
-      slave, [&] { return match.projection.nearest; },
+  double nearest = std::numeric_limits<double>::max();
+  std::vector<std::pair<int, Projection>> near;  // place, projection
+  tree_.visit(
+      slave, [&] { return nearest; },
       [&](int place) {
         const Segment& segment = segments_[place];
         const Projection p = project(segment.corners, segment.x, slave);
-        const bool nearer = p.nearest < match.projection.nearest - tolerance;
-        const bool lower = p.nearest <= match.projection.nearest + tolerance && match.segment >= 0 &&
-                           ids_[segment.index] < ids_[match.segment];
-        if (!nearer && !lower && match.segment >= 0) return;
-        match.segment = segment.index;
-        match.projection = p;
-        match.crossing = segment.crossing ? segment.index : -1;
+        if (p.nearest > nearest) return;
+        nearest = std::min(nearest, p.nearest + tolerance);
+        near.emplace_back(place, p);
       });
+  Match match;
+  for (const auto& [place, p] : near) {
+    const Segment& segment = segments_[place];
+    if (p.nearest > nearest || (match.segment >= 0 && ids_[match.segment] < ids_[segment.index])) continue;
+    match.segment = segment.index;
+    match.projection = p;
+    match.crossing = segment.crossing ? segment.index : -1;
+  }
   return match;
 }
 

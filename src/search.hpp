@@ -3,8 +3,11 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <vector>
 
+#include "box_tree.hpp"
+#include "scene.hpp"
 #include "segment.hpp"
 
 namespace tiefmu {
@@ -29,9 +32,13 @@ class SegmentSearch {
 
   const std::vector<int>& zeroArea() const { return zeroArea_; }  // passed over
   const std::vector<int>& crossing() const { return crossing_; }  // see crossesItself
-  double rootMeanSquareEdge() const { return edge_; }             // m
-  double longestDiagonal() const { return diagonal_; }            // m
+  // The default of search_distance, m: the root mean square edge, (7.4), of `box`, the longest diagonal of
+  // `nearestNode`.
+  double defaultReach(SearchMethod by) const { return by == SearchMethod::box ? edge_ : diagonal_; }
 
+  // take(k, match) for each of `slaves` (m), whose k-th has that match; neighbours after one another.
+  void each(SearchMethod by, const std::vector<Vec3>& slaves, double reach,
+            const std::function<void(int, Match&)>& take) const;
   // Isearch 2: the segment whose closest point is nearest, at most `reach` away.
   Match box(const Vec3& slave, double reach) const;
   // Isearch 1: of the segments that hold the nearest node, at most `reach` away, the one whose closest point is
@@ -42,25 +49,7 @@ class SegmentSearch {
 
  private:
   static constexpr double asNear = 1e-3;  // a rival's distance differs by less than this part
-  struct Box { Vec3 low, high; };
-  class Tree {
-   public:
-    void build(std::vector<Box> boxes);
-    const std::vector<int>& items() const { return items_; }  // in the order of their places
-    // Visits the places of items whose boxes are nearer than `limit()`, which may shrink meanwhile.
-    template <class Limit, class Visit> void visit(const Vec3& s, Limit limit, Visit visit) const;
-
-   private:
-    struct Node {
-      Box box;
-      int first, count;
-    };  // count > 0: leaf; else children at first and first + 1
-    std::vector<Node> nodes_;
-    std::vector<int> items_;
-    std::vector<Box> boxes_;  // per place
-    void split(int node, int first, int last);
-  };
-  struct Segment {  // per place in the tree
+  struct Segment {                        // per place in the tree
     Vec3 x[4];
     int index, corners;
     bool crossing;
@@ -73,14 +62,14 @@ class SegmentSearch {
   };
   double noise(const Vec3& slave) const;
   void consider(int place, const Vec3& slave, Candidates& candidates) const;
+  void hangingAt(const Vec3& slave, double limit, const std::vector<std::pair<double, int>>& holders,
+                 Candidates& candidates) const;
   Match decide(const Candidates& candidates) const;
 
   std::vector<std::int64_t> ids_;
   std::vector<Segment> segments_;
-  std::vector<Vec3> points_;  // of usable segments' nodes, in the order of their places in the tree
   std::vector<int> zeroArea_, crossing_;
-  std::vector<int> holdersBegin_, holders_;  // per point: the places of the segments that hold it
-  Tree segmentTree_, nodeTree_;
+  BoxTree tree_;
   double edge_ = 0, diagonal_ = 0, farthest_ = 0;  // farthest_: largest coordinate, m
 };
 

@@ -130,20 +130,20 @@ void bindKernels(nb::module_& parent) {
         }
         const SearchMethod by = fromWord<SearchMethod>(method);
         const SegmentSearch search(x, std::move(nodes), std::move(ids));
-        const bool box = by == SearchMethod::box;
-        if (!(distance > 0)) distance = box ? search.rootMeanSquareEdge() : search.longestDiagonal();
-        std::vector<int> segment, rival;
-        std::vector<double> gap, local;
-        for (std::size_t s = 0; s < slaves.size() / 3; ++s) {
-          const Vec3 p = at(slaves.data(), static_cast<Eigen::Index>(s));
-          const Match match = box ? search.box(p, distance) : search.nearestNode(p, distance);
-          segment.push_back(match.segment);
-          rival.push_back(match.rival);
-          gap.push_back(match.projection.nearest);
-          local.insert(local.end(), {match.projection.xi, match.projection.eta});
-        }
+        if (!(distance > 0)) distance = search.defaultReach(by);
+        const std::size_t count = slaves.size() / 3;
+        std::vector<Vec3> places;
+        for (std::size_t s = 0; s < count; ++s) places.emplace_back(at(slaves.data(), static_cast<Eigen::Index>(s)));
+        std::vector<int> segment(count), rival(count);
+        std::vector<double> gap(count), local(2 * count);
+        search.each(by, places, distance, [&](int s, const Match& match) {
+          segment[s] = match.segment;
+          rival[s] = match.rival;
+          gap[s] = match.projection.nearest;
+          local[2 * s] = match.projection.xi;
+          local[2 * s + 1] = match.projection.eta;
+        });
         nb::dict d;
-        const std::size_t count = segment.size();
         d["segment"] = numpy(std::move(segment));
         d["distance"] = numpy<double>(std::move(gap), {count});
         d["local"] = numpy<double>(std::move(local), {count, 2});
