@@ -297,19 +297,17 @@ bool collapsed(const Quad& q, double noise, Projection& p) {
   return true;
 }
 
-// A plane quad with an inward corner (a chevron) maps two points of the square to each place beside that corner.
-// There, no answer is the right one: another minimum lies in the same place, or the point is on the fold. A quad that
-// is not plane has one closest point.
-bool folds(const Quad& q, const Stationary& u, const Stationary* found, int count) {
-  constexpr double plane = 1e-6;
-  for (int k = 0; k < count; ++k) {
-    const Stationary& v = found[k];
-    const bool other = v.outside() <= edge && std::abs(v.xi - u.xi) + std::abs(v.eta - u.eta) > 1e-5;
-    if (other && (q.offset(v.xi, v.eta) - q.offset(u.xi, u.eta)).norm() < plane * q.size) return true;
-  }
-  const Vec3 mean = q.c1.cross(q.c2), normal = (q.c1 + u.eta * q.c3).cross(q.c2 + u.xi * q.c3);
-  if (u.outside() > 1 - plane || std::abs(mean.dot(q.c3)) > plane * mean.norm() * std::sqrt(q.g33)) return false;
-  return normal.dot(mean) < plane * mean.squaredNorm();
+// Beside an inward corner (of a chevron) the surface lies over itself, seen along its mean normal m = c1 x c2. There,
+// no answer is right. With J = m.(A x B) = j0 + xi j1 + eta j2, what is turned over has J < 0, and what it lies over
+// are the u whose other point of the same place, u - J (1 / j1, 1 / j2), belongs to the quad, too. A corner that is
+// inward by less than a hundredth counts as straight. A quad that passes the test in `quad` has J > 0 everywhere.
+bool folds(const Quad& q, const Stationary& u) {
+  constexpr double straight = 1e-2;
+  const Vec3 m = q.c1.cross(q.c2);
+  const double j0 = m.squaredNorm(), j1 = m.dot(q.c1.cross(q.c3)), j2 = m.dot(q.c3.cross(q.c2));
+  if (j0 - std::abs(j1) - std::abs(j2) > -straight * j0) return false;
+  const double j = j0 + u.xi * j1 + u.eta * j2;
+  return j <= 0 || Stationary{u.xi - j / j1, u.eta - j / j2}.outside() <= edge;
 }
 
 void complete(const Quad& q, const Stationary& u, Projection& p) {
@@ -371,7 +369,7 @@ Projection quad(const Vec3* corner, const Vec3& slave, double within) {
     if (!best) return p;
   }
   complete(q, *best, p);
-  p.folded = p.outside <= edge && folds(q, *best, found, count);
+  p.folded = p.outside <= edge && folds(q, *best);
   return p;
 }
 

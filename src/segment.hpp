@@ -19,7 +19,7 @@ struct Projection {
   // The closest point of the extended surface within `farthest` is known. For a slave whose closest point of the
   // segment lies inside it, that point; else the closest one beyond the edges that is no farther than the segment.
   bool converged = false;
-  bool folded = false;  // the segment's surface passes this place twice (chevron), or folds in it: no answer is right
+  bool folded = false;  // beside an inward corner (chevron), where the surface lies over itself: no answer is right
   double xi = 0, eta = 0;
   Phi phi{};
   Vec3 offset = Vec3::Zero();  // S - P with P = sum Phi_i x_i, m; from coordinate differences

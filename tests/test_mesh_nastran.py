@@ -126,11 +126,18 @@ def test_includes(tmp_path):
         read(tmp_path, "BEGIN BULK\nINCLUDE 'grids.inc'\n")
 
 
+def test_a_grid_that_is_written_twice_in_one_place_is_one(tmp_path):
+    whole = read(tmp_path, "GRID,7,,0.,1.,2.\nGRID,5,,0.,0.,0.\nGRID,7,,0.,1.,2.0\n")
+    assert whole.node_id.tolist() == [7, 5] and whole.position.tolist() == [[0, 1, 2], [0, 0, 0]]
+    with pytest.raises(tiefmu.SceneError, match="node 7 is repeated"):
+        read(tmp_path, "GRID,7,,0.,1.,2.\nGRID,5,,0.,0.,0.\nGRID,7,,0.,1.,2.01\n")
+
+
 @pytest.mark.parametrize(
     "old, new, words",
     [
         ("GRID    20      ", "GRID    x       ", "GRID: expected a whole number, found 'x'"),
-        ("1.+0", "1.+z", "GRID: expected a number, found '1.+z'"),
+        ("1.+0", "1.+z", "GRID 20: expected a number, found '1.+z'"),
         ("1.E+0,0.", "1.E+0,nan", "node 40: a coordinate is not a finite number"),
         (
             "GRID    20              ",

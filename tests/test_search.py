@@ -157,11 +157,58 @@ def test_a_chevron_holds_what_lies_in_it():
     np.testing.assert_allclose(found["phi"] @ CHEVRON, points, atol=1e-12)
 
 
-def test_a_slave_where_a_chevron_folds_is_an_error():
-    nodes = [(k + 1, *x) for k, x in enumerate(CHEVRON.tolist())]
-    for x in ((0.31, 0.31, 0.0), (0.32, 0.32, 0.05)):
+def warped_chevron(warp):
+    return CHEVRON + np.array([0, 0, 1])[None] * np.array([[0], [0], [warp], [0]])
+
+
+@pytest.mark.parametrize("warp", [0, 1e-15, 1e-5, 0.01, 0.05])
+def test_a_slave_where_a_chevron_folds_is_an_error(warp):
+    """On the diagonal, x = y = (1.3 + 0.6 t - 0.7 t^2) / 4: up to 5/14 = 0.357, beyond the corner at 0.3."""
+    nodes = [(k + 1, *x) for k, x in enumerate(warped_chevron(warp).tolist())]
+    for x in ((0.31, 0.31, 0.0), (0.32, 0.32, 0.05), (0.32, 0.32, -0.05)):
         said = refusal([*nodes, (101, *x)], [[1, 1, 2, 3, 4]], [101])
         assert "which folds onto itself there (one of its corners points inward)" in said
+
+
+@pytest.mark.parametrize("warp", [0, 1e-5, 0.01, 0.05])
+def test_a_chevron_folds_outside_its_outline_alone(warp):
+    """Seen along the mean normal; slaves on the surface itself, whose places are known."""
+    rng = np.random.default_rng(4)
+    corners = warped_chevron(warp)
+    points = np.array([shape(4, *at) @ corners for at in rng.uniform(-1, 1, (4000, 2))])
+    normal = np.cross(corners[2] - corners[0], corners[3] - corners[1])
+    plane = np.linalg.svd(normal[None])[2][1:]  # two directions across it
+    (a, b, c, d), seen = corners @ plane.T, points @ plane.T
+
+    def left(p, q):  # of the line from p to q, on the side of the first corner
+        across = np.array([p[1] - q[1], q[0] - p[0]])
+        return ((seen - p) @ across) * ((a - p) @ across) > 0
+
+    inside = left(b, c) | left(c, d)
+    found = kernels.project(corners, points)
+    assert found["converged"].all() and found["outside"].max() <= 1 + 1e-9
+    assert (~inside).sum() > 100 and (found["folded"] == ~inside).all()
+    np.testing.assert_allclose((found["phi"] @ corners)[inside], points[inside], atol=1e-9)
+
+
+def test_a_corner_inward_by_rounding_is_straight():
+    """n4 near the middle of the edge from n3 to n1 of a triangle, inward by 1e-3: a slave at that node is found."""
+    for inward in (0, 1e-3, -1e-3):
+        middle = np.array([0.5, 0.5, 0]) - inward * np.array([1, 1, 0]) / np.sqrt(2)
+        nodes = [(1, 0, 1, 0), (2, 0, 0, 0), (3, 1, 0, 0), (4, *middle), (101, *middle)]
+        found = report(nodes, [[1, 1, 2, 3, 4]], [101])
+        assert found["warnings"] == [] and found["slaves"][0]["distance"] < 1e-15
+
+
+@pytest.mark.parametrize("height, segment", [(0.05, 2), (0.13, 2), (0.15, 2)])
+def test_a_nearer_segment_that_folds_is_told(height, segment):
+    """Under a plane square at z = 0.2; the chevron is nearer up to 0.1."""
+    nodes = [(k + 1, *x) for k, x in enumerate(CHEVRON.tolist())]
+    square = [(11, -1, -1, 0.2), (12, 2, -1, 0.2), (13, 2, 2, 0.2), (14, -1, 2, 0.2)]
+    found = report([*nodes, *square, (101, 0.32, 0.32, height)], [[1, 1, 2, 3, 4], [2, 11, 12, 13, 14]], [101])
+    assert found["slaves"][0]["segment"] == segment
+    told = "tie 'tie': slave 101: segment 1 is nearer, but folds onto itself there (one of its corners points inward); "
+    assert found["warnings"] == ([told + "passed over"] if height < 0.1 else [])
 
 
 def test_a_chevron_leaves_slaves_beside_it_to_its_neighbour():

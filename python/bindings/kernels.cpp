@@ -95,7 +95,7 @@ void bindKernels(nb::module_& parent) {
       "corners"_a, "points"_a,
       "Closest points of a segment (corners (n, 3), m) to points (m, 3): local (m, 2), phi and clamped (m, n), "
       "distance (m,) to the projection, outside (m,), nearest (m,): distance to the closest point of the segment, "
-      "converged (m,): a projection within 1.5 is known, folded (m,): the surface passes the place twice.");
+      "converged (m,): a projection within 1.5 is known, folded (m,): the surface lies over itself there.");
 
   m.def(
       "node_inertia",

@@ -135,12 +135,15 @@ def grids(cards) -> tuple[np.ndarray, np.ndarray]:
     ids = whole([row[0] for row in rows], "GRID")
     if ids.min(initial=1) < 1:
         raise SceneError(f"GRID {ids.min()}: ids start at 1")
-    position = np.column_stack([numbers([row[k] for row in rows]) for k in (2, 3, 4)]).reshape(-1, 3)
+    position = np.column_stack([numbers([row[k] for row in rows], "GRID", ids) for k in (2, 3, 4)]).reshape(-1, 3)
     default = (cards["GRDSET"][0][1].strip() if cards["GRDSET"] else "") or "0"
-    system = whole([row[1] if row[1].strip() else default for row in rows], "GRID")
+    system = whole([row[1] if row[1].strip() else default for row in rows], "GRID", ids=ids)
     for number in np.unique(system[system != 0]).tolist():
         mine = system == number
         position[mine] = in_basic(cards, number, position[mine], ())
+    if len(np.unique(ids)) < len(ids):  # Nastran takes a GRID that is written twice, in the same place
+        _, first = np.unique(np.column_stack([ids, position.view(np.int64)]), axis=0, return_index=True)
+        ids, position = ids[np.sort(first)], position[np.sort(first)]
     return ids, position
 
 
@@ -154,8 +157,8 @@ def in_basic(cards, number: int, position: np.ndarray, below: tuple[int, ...]) -
     if number in below:
         raise SceneError(f"coordinate system {number} is defined by itself")
     name, row = found[0]
-    points = numbers([*row, *[""] * 4][2:11]).reshape(3, 3)
-    parent = whole([row[1] if row[1].strip() else "0"], name)[0]
+    points = numbers([*row, *[""] * 4][2:11], f"{name} {number}").reshape(3, 3)
+    parent = whole([row[1] if row[1].strip() else "0"], f"{name} {number}")[0]
     origin, on_z, in_xz = in_basic(cards, int(parent), points, (*below, number))
     z = on_z - origin
     y = np.cross(z, in_xz - origin)
@@ -187,8 +190,8 @@ def elements(file: MeshFile, cards):
         nodes = np.zeros((len(rows), most), np.int64)
         for k in range(most):
             column = [fields[first + k] if len(fields) > first + k else "" for fields in rows]
-            nodes[:, k] = whole([item if item.strip() else "0" for item in column], name)
-        properties = whole([fields[field] or "0" for fields in rows], name, blank="0") if field else None
+            nodes[:, k] = whole(column, name, blank="0", ids=number)
+        properties = whole([fields[field] for fields in rows], name, "0", number) if field else None
         corners = CORNERS.get(shape, most)
         second = (nodes[:, corners:] != 0).any(axis=1)
         for mask, width in ((~second, corners), (second, most)):
@@ -280,16 +283,21 @@ def listed(words: list[str], name: str) -> np.ndarray:
     return np.concatenate([np.empty(0, np.int64), *ids])
 
 
-def whole(items: list[str], name: str, blank: str = "") -> np.ndarray:
+def whole(items: list[str], name: str, blank: str = "", ids: np.ndarray | None = None) -> np.ndarray:
+    """name: of the card, ids: of the cards that the items stand in; for messages."""
     try:
         return fortran_whole(items, blank)
     except FieldError as error:
-        raise SceneError(f"{name}: {error}") from None
+        raise in_card(error, name, ids) from None
 
 
-def numbers(items: list[str]) -> np.ndarray:
+def numbers(items: list[str], name: str, ids: np.ndarray | None = None) -> np.ndarray:
     """Numbers as Nastran writes them (1.5-3 and 1.D0); blank: 0."""
     try:
         return fortran_numbers(items)
     except FieldError as error:
-        raise SceneError(f"GRID: {error}") from None
+        raise in_card(error, name, ids) from None
+
+
+def in_card(error: FieldError, name: str, ids: np.ndarray | None) -> SceneError:
+    return SceneError(f"{name if ids is None else f'{name} {ids[error.index]}'}: {error}")
