@@ -240,3 +240,17 @@ def test_damaged_files_are_refused_in_one_line(tmp_path, ending):
             read(path)
         except tiefmu.SceneError as error:
             assert "\n" not in str(error)
+
+
+@pytest.mark.parametrize(
+    "name, cells, words",
+    [
+        ("panel.cgns", CELLS[1:], "it knows CGNS of tetrahedra alone; save the mesh as Exodus, MED or Gmsh"),
+        ("panel.xdmf", [CELLS[2], ("line3", [[0, 1, 2]])], "it does not know 34"),
+    ],
+)
+def test_what_meshio_writes_and_does_not_read(tmp_path, name, cells, words):
+    meshio.write(tmp_path / name, meshio.Mesh(POINTS, cells))
+    with pytest.raises(tiefmu.SceneError) as error:
+        read(tmp_path / name)
+    assert str(error.value) == f"file: {name}: meshio cannot read it: {words}"

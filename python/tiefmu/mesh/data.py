@@ -347,7 +347,8 @@ def span(ids: np.ndarray) -> str:
 
 
 def listed(ids: np.ndarray) -> str:
-    """ "1, 2, 3", or the first ten and how many there are."""
+    """ "1, 2, 3" in ascending order, or the first ten and how many there are."""
+    ids = np.sort(ids)
     words = ", ".join(map(str, ids[:10]))
     return words if len(ids) <= 10 else f"{words}, ... ({len(ids)} in all)"
 

@@ -32,6 +32,10 @@ def read(path: Path) -> MeshFile:
         raise needed(error) from None
     except (Exception, SystemExit) as error:
         words = " ".join((said.getvalue() if isinstance(error, SystemExit) else str(error)).split())
+        if path.suffix.lower() == ".cgns":
+            words = "it knows CGNS of tetrahedra alone; save the mesh as Exodus, MED or Gmsh"
+        elif isinstance(error, KeyError):
+            words = f"it does not know {error.args[0]}"  # such as the number of a kind of cell
         raise SceneError(f"meshio cannot read it{f': {words}' if words else ''}") from None
     try:
         return converted(mesh)
