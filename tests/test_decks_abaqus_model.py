@@ -6,7 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from input_deck import InputDeck
-from tiefmu import decks
+from test_decks_scene import run_in_fmpy
+from tiefmu import decks, scene
 from tiefmu.decks import abaqus
 from tiefmu.decks.abaqus import keywords, loads
 from tiefmu.decks.element_properties import nodal
@@ -391,6 +392,50 @@ def test_gravity(tmp_path):
     assert "model" not in found.scene.tables and any("(ramp) and is not taken" in line for line in found.deck.warnings)
     found = read(deck().block("DLOAD", "plate, GRAV, 9.81, 0., 0., -1."), tmp_path)
     assert any("acts on 'plate' only" in line for line in found.deck.warnings)
+
+
+# the whole way
+
+
+LAP_JOINT = Path(__file__).parent / "decks" / "lap_joint.inp"
+
+
+def test_a_deck_of_the_repository_runs_in_fmpy(tmp_path):
+    decks.import_deck(LAP_JOINT, tmp_path / "scene.toml")
+    one, two = (report(scene.load(path)) for path in (tmp_path / "scene.toml", LAP_JOINT))
+    assert one["slaves"] == two["slaves"] and len(one["slaves"]) == 10
+    run_in_fmpy(LAP_JOINT, tmp_path)
+    run_in_fmpy(LAP_JOINT, tmp_path, free=("Block-1",))
+
+
+def test_the_command_line(tmp_path, command):
+    (tmp_path / "job.inp").write_text(LAP_JOINT.read_text())
+    found = command("import", "job.inp", "--tie", "weld", "--tie", "GLUE", "-o", "weld.toml")
+    assert found.returncode == 0, found.stderr
+    assert "weld.toml: 2 ties, 15 nodes, 2 segments, 0 springs" in found.stdout
+    for words in (("info", "job.inp"), ("build", "job.inp"), ("run", "job.inp", "--stop-time", "0.001")):
+        found = command(*words)
+        assert found.returncode == 0 and "Traceback" not in found.stderr, found.stderr
+    found = command("import", "job.inp", "--tie", "wel")
+    assert found.returncode == 2 and "no tie is called 'wel'; did you mean 'weld'?" in found.stderr
+    (tmp_path / "job.inp").write_text(LAP_JOINT.read_text().replace("material=Steel", "material=Steal", 1))
+    found = command("build", "job.inp")
+    assert found.returncode == 2 and found.stderr.count("\n") == 1
+    assert "job.inp: line 32: *SOLID SECTION: material 'Steal' is not in the deck" in found.stderr
+
+
+def test_a_mesh_file_of_a_scene_is_read_as_before(tmp_path):
+    (tmp_path / "job.inp").write_text(LAP_JOINT.read_text())
+    tables = {
+        "mesh": {"file": str(tmp_path / "job.inp")},
+        "node": [{"nodes": "all", "mass": 1.0}],
+        "tie": [{"segments": "Top", "slaves": "foot", "search_distance": 0.001}],
+        "units": {"length": "mm"},
+    }
+    with pytest.raises(scene.SceneError, match=r"no segment found within search_distance 0.001 mm"):
+        scene.load(tables)
+    tables["tie"][0]["search_distance"] = 0.3
+    assert [row["id"] for row in report(scene.load(tables))["slaves"]] == [301]
 
 
 # refusals, pages

@@ -125,11 +125,16 @@ def test_adjust_leaves_room_for_the_thickness(tmp_path):
     assert at[21] == pytest.approx([0.5, 0.5, 5e-4], abs=1e-15)
 
 
-def test_no_rotation_hands_none_on(tmp_path):
-    made = deck().tie("pins", "quads", ", NO ROTATION, CONSTRAINT RATIO=0.5, POSITION TOLERANCE=0.5")
-    found = read(made, tmp_path)
-    assert set(found.scene.columns["rotations"]) == {"false"}
-    assert any("CONSTRAINT RATIO is left aside" in line for line in found.deck.warnings)
+@pytest.mark.parametrize(
+    "options", [", NO ROTATION", ", NO ROTATION, CONSTRAINT RATIO=0.5", ", NoRotation, ConstraintRatio=1."]
+)
+def test_no_rotation_leaves_those_of_the_slaves_out(tmp_path, options):
+    made = deck().block("ELEMENT, TYPE=S4R, ELSET=lid", "4, 31, 32, 33, 34").shell("lid")
+    made.nodes({31: (0.1, 0.1, 0.1), 32: (0.9, 0.1, 0.1), 33: (0.9, 0.9, 0.1), 34: (0.1, 0.9, 0.1)})
+    found = read(made.tie("lid", "quads", f"{options}, POSITION TOLERANCE=0.5"), tmp_path)
+    turning = dict(zip(found.scene.node_id.tolist(), found.scene.columns["rotations"].tolist()))
+    assert [turning[node] for node in (1, 2, 31, 32)] == ["true", "true", "false", "false"]
+    assert any("translations are tied at the slaves" in line for line in found.deck.warnings) == ("1." not in options)
 
 
 def test_tied_nset(tmp_path):

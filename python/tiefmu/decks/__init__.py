@@ -50,7 +50,10 @@ def read(path: Path, ties: list[str] | None = None, free: tuple[str, ...] = ()) 
         raise SceneError(f"{path}: no such file")
     reader = language(path)
     if reader is None:
-        raise SceneError(f"{path}: is no deck; Radioss starter decks and LS-DYNA keyword decks can be imported")
+        raise SceneError(
+            f"{path}: is no deck; Radioss starter decks, LS-DYNA keyword decks and Abaqus or CalculiX input files with "
+            "*TIE can be imported"
+        )
     deck = reader.read(path, str(path), ties)
     found = Imported(deck, to_scene.convert(deck, free))
     if found.scene.pairwise:

@@ -10,11 +10,11 @@ def add_parser(commands):
     command = commands.add_parser(
         "import",
         help="write the scene of a finite-element deck's ties",
-        description="Reads the ties of a Radioss starter deck or an LS-DYNA keyword deck, with the masses, inertias, "
+        description="Reads the ties of a Radioss, Abaqus, CalculiX or LS-DYNA deck, with the masses, inertias, "
         "stiffnesses and rotations that the solver would give their nodes, and writes a scene file, with mesh and node "
         "properties beside it. What was decided and why stands at the head of the scene file.",
     )
-    command.add_argument("deck", metavar="DECK", type=Path, help="deck, e.g. model_0000.rad or crash.k")
+    command.add_argument("deck", metavar="DECK", type=Path, help="deck, e.g. model_0000.rad, job.inp or crash.k")
     command.add_argument(
         "--tie",
         metavar="NAME",
@@ -26,8 +26,8 @@ def add_parser(commands):
         metavar="NAME",
         action="append",
         default=[],
-        help="title or id of a part or node set whose masters the FMU moves itself; may be given several times "
-        "(default: the host moves all masters)",
+        help="title or id of a part, instance or node set whose masters the FMU moves itself; may be given several "
+        "times (default: the host moves all masters)",
     )
     command.add_argument(
         "-o", "--output", metavar="SCENE", type=Path, help="scene file to write (default: name of the deck + .toml)"

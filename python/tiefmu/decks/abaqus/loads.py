@@ -154,13 +154,14 @@ def multi_point(source: Source, scope: Scope, block: Block):
 
 
 def add(source: Source, block: Block, name: str, main: int, nodes: np.ndarray):
-    """A rigid body; its nodes turn with it."""
+    """A rigid body. The nodes of a *RIGID BODY turn with it, also those of elements that have no rotations."""
     deck = source.deck
     nodes = nodes[nodes != main]
     if not len(nodes):
         return
     deck.rigid.append(RigidBody(name or f"rigid body {len(deck.rigid) + 1}", main, nodes, block.where))
-    deck.added_inertia.append((nodes, 0.0))
+    if block.key == "RIGIDBODY":
+        deck.added_inertia.append((nodes, 0.0))
 
 
 def initial(source: Source):

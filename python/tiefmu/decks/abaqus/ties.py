@@ -58,14 +58,14 @@ def one(source: Source, scope: Scope, block: Block, name: str, line: int, items:
         block.fail(f"tie '{name}': master '{items[1]}' holds no faces", line)
     adjust = adjusted(block, name)
     tie = Tie(name, nodes, faces, unresolved="drop", adjust=adjust, where=block.where)
-    tie.hand_on_rotations = not block.has("NO ROTATION")
-    if not tie.hand_on_rotations:
-        said.append("NO ROTATION: rotations are not handed on")
-    if block.has("CONSTRAINT RATIO"):
-        deck.warn(
-            f"{block.where}: tie '{name}': CONSTRAINT RATIO is left aside; without rotations a slave's offset does not "
-            "turn with the master"
-        )
+    tie.slave_rotations = not block.has("NO ROTATION")
+    if not tie.slave_rotations:
+        said.append("NO ROTATION: the slaves' rotations are left out")
+        if block.get("CONSTRAINT RATIO") not in ("1", "1.", "1.0"):
+            deck.warn(
+                f"{block.where}: tie '{name}': translations are tied at the slaves, as with CONSTRAINT RATIO 1, not "
+                "in between"
+            )
     tolerance(source, tie, block, chosen_nodes is not None, said)
     thick = deck.language == "Abaqus" and not block.has("NO THICKNESS")
     tie.thick_slaves = thick and of_faces

@@ -1,6 +1,6 @@
 """Radioss starter decks (formats 4.1 to 2026): from the file to a Deck.
 
-Column layouts follow the reader configuration of OpenRadioss; docs/decks.md lists the keywords.
+Column layouts follow the reader configuration of OpenRadioss; docs/decks_radioss.md lists the keywords.
 """
 
 from pathlib import Path
