@@ -5,6 +5,8 @@
 #include <Eigen/Geometry>
 #include <cmath>
 
+#include "elementary.hpp"
+
 namespace tiefmu {
 
 using Vec3 = Eigen::Vector3d;
@@ -35,8 +37,9 @@ inline Quat exponential(const Vec3& angle) {
     s = 1 - half2 / 6 * (1 - half2 / 20 * (1 - half2 / 42 * (1 - half2 / 72 * (1 - half2 / 110))));
   } else {
     const double half = std::sqrt(half2);
-    c = std::cos(half);
-    s = std::sin(half) / half;
+    const SineCosine of = sineCosine(half);
+    c = of.cosine;
+    s = of.sine / half;
   }
   const Vec3 v = 0.5 * s * angle;
   return Quat(c, v.x(), v.y(), v.z());
@@ -66,7 +69,7 @@ inline Vec3 logarithm(const Quat& q) {
   const double sign = q.w() < 0 ? -1.0 : 1.0;
   const Vec3 v = sign * q.vec();
   const double n = v.norm();
-  return n < 1e-12 ? Vec3(2.0 * v) : Vec3(2.0 * std::atan2(n, sign * q.w()) / n * v);
+  return n < 1e-12 ? Vec3(2.0 * v) : Vec3(2.0 * angleOf(n, sign * q.w()) / n * v);
 }
 
 }  // namespace tiefmu

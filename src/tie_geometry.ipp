@@ -3,6 +3,7 @@
 
 #include <cmath>
 
+#include "elementary.hpp"
 #include "tie_loops.ipp"
 
 namespace tiefmu {
@@ -90,9 +91,10 @@ bool updateFrames(const TieView& tie, const double* position, SegmentFrame* fram
 // sin(a)/a and (1 - cos a)/a^2 of steps above 2 degrees.
 TIEFMU_INLINE void large(double a2, double& s, double& c) {
   if (!(a2 >= 1e-3)) return;
-  const double a = std::sqrt(a2), half = std::sin(0.5 * a);
-  s = std::sin(a) / a;
-  c = 2 * half * half / a2;
+  const double a = std::sqrt(a2);
+  const SineCosine half = sineCosine(0.5 * a);
+  s = 2 * half.sine * half.cosine / a;
+  c = 2 * half.sine * half.sine / a2;
 }
 TIEFMU_INLINE void large(const Simd4& a2, Simd4& s, Simd4& c) {
   if (!((a2[0] >= 1e-3) | (a2[1] >= 1e-3) | (a2[2] >= 1e-3) | (a2[3] >= 1e-3))) return;

@@ -53,6 +53,17 @@ void bindKernels(nb::module_& parent) {
         "whether they are the baseline's now.");
 
   m.def(
+      "sine_cosine",
+      [](double angle) {
+        const SineCosine of = sineCosine(angle);
+        return std::pair(of.sine, of.cosine);
+      },
+      "angle"_a, "Of an angle, rad.");
+  m.def(
+      "angle_of", [](double y, double x) { return angleOf(y, x); }, "y"_a, "x"_a,
+      "Angle of the point (x, y), neither negative, in [0, pi/2] rad.");
+
+  m.def(
       "shape",
       [](int n, double xi, double eta) {
         if (n != 3 && n != 4) throw nb::value_error("n is 3 or 4");
