@@ -8,6 +8,9 @@
 # make sanitize  100,000 random sequences of calls under sanitizers (make test: 2,000)
 # make projections  1,000,000 random quads against a search in extended precision (make test: 20,000)
 # make fuzz   60 s of fuzzing of resources, serialised states and scene files
+# make binaries  build the FMU's library for Linux (glibc 2.17 or later) and Windows, for every FMU built afterwards;
+#             make binaries PLATFORMS="aarch64-linux ..." builds others. About ten minutes each.
+# make test-linux, test-windows, test-arm  run what `make binaries` built, the latter two under wine and qemu-user
 # make bench  time the kernels, the FMU calls and what grows with a scene, write bench/latest.csv and docs/bench.svg
 # Bench counts instructions too.
 PYTHON ?= python3
@@ -19,7 +22,7 @@ SOURCES := CMakeLists.txt $(wildcard src/*.?pp modelDescription/*.?pp fmu/*.?pp 
 # Each set in an environment of its own; not compiled ahead, as most of their files are never imported.
 TOOLS := build/tools/importers/installed build/tools/cofmupy/installed
 
-.PHONY: demo test instructions lint format tools study sanitize projections fuzz bench valgrind clean
+.PHONY: demo test binaries test-linux test-windows test-arm instructions lint format tools study sanitize projections fuzz bench valgrind clean
 demo: $(VENV)/installed
 	$(BIN)/tiefmu demo --out out
 	$(BIN)/tiefmu accept examples/acceptance/weld.toml examples/acceptance/criteria.toml --pictures out/acceptance
@@ -77,6 +80,25 @@ $(VENV)/built-with: pyproject.toml
 $(VENV)/installed: $(VENV)/built-with $(SOURCES)
 	$(BIN)/python -m pip install --quiet --no-build-isolation --editable '.[test,dev]'
 	touch $@
+
+PLATFORMS ?= linux64 win64
+binaries: $(VENV)/installed build/zig/installed
+	PATH=$(abspath $(BIN)):$$PATH $(BIN)/python cmake/build_binaries.py build/zig/wheel/ziglang $(PLATFORMS)
+
+build/zig/installed: cmake/requirements.txt
+	$(BIN)/python -m pip install --quiet --no-compile --no-deps --upgrade --target build/zig/wheel -r $<
+	touch $@
+
+# What `make binaries` built, where it is meant to run. Debian: wine; qemu-user and libc6-arm64-cross.
+test-linux: binaries
+	$(BIN)/python -m pytest -m elsewhere -k linux64 tests/test_elsewhere.py
+
+test-windows: binaries
+	$(BIN)/python -m pytest -m elsewhere -k win64 tests/test_elsewhere.py
+
+test-arm: PLATFORMS := aarch64-linux
+test-arm: binaries
+	$(BIN)/python -m pytest -m elsewhere -k aarch64-linux tests/test_elsewhere.py
 
 tools: $(TOOLS)
 

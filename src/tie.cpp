@@ -4,13 +4,29 @@
 #include <cmath>
 
 #include "tie_kernels.hpp"
+#ifdef TIEFMU_AVX2
+#include <cpuid.h>
+#endif
 
 namespace tiefmu {
 namespace {
 
+#ifdef TIEFMU_AVX2
+// Whether processor and system can run AVX2. Not __builtin_cpu_supports, which needs a run-time library that not every
+// compiler brings.
+bool hasAvx2() {
+  unsigned a, b, c, d;
+  constexpr unsigned osxsave = 1u << 27, avx = 1u << 28, avx2 = 1u << 5, registers = 6;  // that of SSE and of AVX
+  if (!__get_cpuid(1, &a, &b, &c, &d) || (c & osxsave) == 0 || (c & avx) == 0) return false;
+  unsigned kept, high;  // which registers the system keeps for each process
+  __asm__("xgetbv" : "=a"(kept), "=d"(high) : "c"(0));
+  return (kept & registers) == registers && __get_cpuid_count(7, 0, &a, &b, &c, &d) && (b & avx2) != 0;
+}
+#endif
+
 const TieKernels* fastest() {
 #ifdef TIEFMU_AVX2
-  if (__builtin_cpu_supports("avx2")) return &avx2Kernels;
+  if (hasAvx2()) return &avx2Kernels;
 #endif
   return &baselineKernels;
 }

@@ -1,7 +1,6 @@
 """An FMU seen through its C functions: every call gives back the bare status, and every log message is kept."""
 
 import ctypes
-import sys
 import tempfile
 import zipfile
 from ctypes import byref, c_char_p, c_double, c_int, c_size_t, c_uint, c_void_p
@@ -10,6 +9,7 @@ from pathlib import Path
 import fmpy
 import numpy as np
 import tiefmu
+from tiefmu.platforms import here
 
 # Refused, but there: some importers look up every function of the standard.
 MODEL_EXCHANGE = [
@@ -26,8 +26,8 @@ MODEL_EXCHANGE = [
 ]
 
 OK, WARNING, DISCARD, ERROR, FATAL, PENDING = range(6)
-# The logger is variadic; our messages come as the one argument after the format.
-Logger = ctypes.CFUNCTYPE(None, c_void_p, c_char_p, c_int, c_char_p, c_char_p, c_char_p)
+# The logger is variadic; our messages are the format, without arguments.
+Logger = ctypes.CFUNCTYPE(None, c_void_p, c_char_p, c_int, c_char_p, c_char_p)
 
 
 class Callbacks(ctypes.Structure):
@@ -55,11 +55,8 @@ class Fmu:
         )
         self.variables = {v.name: v for v in self.description.modelVariables}
         self.reference = {v.name: v.valueReference for v in self.description.modelVariables}
-        platform, suffix = {"win32": ("win64", ".dll"), "darwin": ("darwin64", ".dylib")}.get(
-            sys.platform, ("linux64", ".so")
-        )
         identifier = self.description.coSimulation.modelIdentifier
-        self.binary = self.folder / "binaries" / platform / (identifier + suffix)
+        self.binary = self.folder / "binaries" / here().folder / (identifier + here().suffix)
         self.library = ctypes.CDLL(str(self.binary))
         self.library.fmi2Instantiate.restype = c_void_p
         self.library.fmi2Instantiate.argtypes = [c_char_p, c_int, c_char_p, c_char_p, c_void_p, c_int, c_int]
@@ -70,14 +67,16 @@ class Fmu:
 
 
 class Instance:
-    """`log` holds (environment, instance name, status, category, format, text) of every message."""
+    """`log` holds (environment, instance name, status, category, format, text) of every message; a format that asks
+    for an argument fails."""
 
     def __init__(self, fmu: Fmu, name="tie", guid=None, location=None, kind=1, logging=False, environment=0):
         self.fmu = fmu
         self.log = []
 
         def keep(*message):
-            self.log.append(tuple(m.decode() if isinstance(m, bytes) else m for m in message))
+            *head, form = (m.decode() if isinstance(m, bytes) else m for m in message)
+            self.log.append((*head, form, form % ()))
 
         self.callbacks = Callbacks(Logger(keep), None, None, None, environment)
         location = (fmu.folder / "resources").as_uri() if location is None else location

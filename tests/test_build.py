@@ -8,7 +8,8 @@ import zipfile
 import numpy as np
 import pytest
 import tiefmu
-from tiefmu import package
+from tiefmu import binaries, package
+from tiefmu.platforms import here
 
 
 def found(scene: dict) -> dict:
@@ -276,11 +277,12 @@ def test_two_builds_are_byte_identical(weld, tmp_path):
     assert one.read_bytes() == two.read_bytes()
 
 
-def test_archive(weld, tmp_path):
+def test_archive(weld, tmp_path, monkeypatch):
+    monkeypatch.setattr(binaries, "BUILT", tmp_path / "nowhere")
     with zipfile.ZipFile(tiefmu.build(tiefmu.load(weld), tmp_path / "weld.fmu")) as archive:
         infos = archive.infolist()
         assert [info.filename for info in infos] == [
-            f"binaries/{package.PLATFORM}/scene{package.SUFFIX}",
+            f"binaries/{here().folder}/scene{here().suffix}",
             "documentation/index.html",
             *(f"documentation/licenses/{name}.txt" for name in ("cereal", "fmi", "license", "tiefmu")),
             "extra/tiefmu/reference_in.csv",

@@ -9,11 +9,13 @@ from pathlib import Path
 from . import __version__, advise, study
 from .acceptance import command as accept_command
 from .arguments import check_folder_of, existing, is_fmu, positive, whole
+from .binaries import libraries, stale
 from .decks import command as import_command
 from .demo import SCENES, demo
 from .errors import RunError, SceneError, UsageError
 from .models import fmu_of, show_warnings
 from .package import build
+from .platforms import BY_FOLDER
 from .plot import check_picture, plot
 from .report import counted, of_fmu, report, summary, text
 from .results import check_format
@@ -69,6 +71,13 @@ def parser() -> argparse.ArgumentParser:
     )
     build.add_argument(
         "--criteria", metavar="TOML", type=Path, help="criteria of acceptance to put into the FMU, with their files"
+    )
+    build.add_argument(
+        "--platforms",
+        metavar="NAMES",
+        type=lambda text: [name.strip() for name in text.split(",")],
+        help=f"systems that the FMU is for, of {', '.join(BY_FOLDER)} (default: this one; also linux64 and win64 where "
+        "`make binaries` has built them)",
     )
     build.set_defaults(command=run_build)
 
@@ -138,10 +147,17 @@ def parser() -> argparse.ArgumentParser:
 def run_build(options: argparse.Namespace) -> None:
     scene = load(options.scene)
     criteria = accept_command.packed(options.criteria) if options.criteria else {}
-    fmu = build(scene, options.output or Path(f"{scene.name}.fmu"), criteria)
+    fmu = build(scene, options.output or Path(f"{scene.name}.fmu"), criteria, options.platforms)
     found = report(scene)
     show_warnings(options.scene, found)
-    print(f"{fmu}: {summary(found)}, {fmu.stat().st_size / 1024:.0f} KiB")
+    if not options.platforms and stale():
+        print(
+            f"warning: libraries for {', '.join(stale())} are left out: they were made from other sources; run "
+            "`make binaries` again",
+            file=sys.stderr,
+        )
+    systems = ", ".join(library.text for library in libraries(options.platforms))
+    print(f"{fmu}: {summary(found)}, {fmu.stat().st_size / 1024:.0f} KiB, for {systems}")
     if found["notes"]:
         print(f"{counted(len(found['notes']), 'note')} on the scene: tiefmu info {options.scene}")
 

@@ -1,10 +1,9 @@
-"""Packing a scene as an FMU. The same scene and the same binary give the same bytes."""
+"""Packing a scene as an FMU. The same scene and the same libraries give the same bytes."""
 
 import hashlib
 import io
 import json
 import os
-import sys
 import uuid
 import zipfile
 from importlib.metadata import version
@@ -12,19 +11,20 @@ from pathlib import Path
 
 from . import _core
 from .arguments import check_folder_of
+from .binaries import libraries
 from .content import content
 from .errors import UsageError
 from .report import report
 from .scene import Scene
 
-PLATFORM, SUFFIX = {"win32": ("win64", ".dll"), "darwin": ("darwin64", ".dylib")}.get(sys.platform, ("linux64", ".so"))
 
-
-def build(scene: Scene, path, extra: dict[str, bytes] | None = None) -> Path:
+def build(scene: Scene, path, extra: dict[str, bytes] | None = None, platforms: list[str] | None = None) -> Path:
     """Writes the FMU to `path` and returns it. Nothing is left behind when it fails. extra: further files, path in the
     archive -> bytes.
 
-    Raises UsageError where the file cannot be written.
+    platforms: folders below binaries/, e.g. ["linux64", "win64"]; by default that of this system, and linux64 and win64
+    where `make binaries` has built them. Raises UsageError where the file cannot be written, and for a platform that
+    there is no library for.
     """
     path = Path(path)
     check_folder_of(path)
@@ -33,7 +33,7 @@ def build(scene: Scene, path, extra: dict[str, bytes] | None = None) -> Path:
     part = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
         with zipfile.ZipFile(part, "w", zipfile.ZIP_DEFLATED) as archive:
-            for name, data in sorted((contents(scene) | (extra or {})).items()):
+            for name, data in sorted((contents(scene, platforms) | (extra or {})).items()):
                 archive.writestr(entry(name), data, compresslevel=3)  # a third of the time of 6, 15 % more bytes
         part.replace(path)
     except OSError as error:
@@ -43,19 +43,20 @@ def build(scene: Scene, path, extra: dict[str, bytes] | None = None) -> Path:
     return path
 
 
-def contents(scene: Scene) -> dict[str, bytes]:
+def contents(scene: Scene, platforms: list[str] | None = None) -> dict[str, bytes]:
     """Path in the archive -> bytes."""
+    carried = libraries(platforms)
+    identifier = _core.model_identifier(scene.name)
     # The text of a large model comes last: by then the report's lists are gone, which are as large.
     description = _core.Description(scene.model, scene.name, scene.title)
     files = from_report(scene, description.step_size)
     guid = model_guid(scene, description)
     xml = io.BytesIO()
     description.write(guid, xml.write)
-    return files | {
-        "modelDescription.xml": xml.getvalue(),
-        f"binaries/{PLATFORM}/{_core.model_identifier(scene.name)}{SUFFIX}": binary(),
-        "resources/scene.bin": scene.model.resource(guid),
-    }
+    for library in carried:
+        files[f"binaries/{library.platform.folder}/{identifier}{library.platform.suffix}"] = library.data
+        files |= {f"documentation/licenses/{name}": text for name, text in library.licenses.items()}
+    return files | {"modelDescription.xml": xml.getvalue(), "resources/scene.bin": scene.model.resource(guid)}
 
 
 def from_report(scene: Scene, step: float) -> dict[str, bytes]:
@@ -69,15 +70,6 @@ def model_guid(scene: Scene, description: _core.Description) -> str:
     description.write("", digest.update)
     digest.update(scene.model.resource(""))
     return f"{{{uuid.UUID(bytes=digest.digest()[:16])}}}"
-
-
-def binary() -> bytes:
-    """The shared library with the FMI functions, installed beside the solver's module."""
-    folder = Path(_core.__file__).parent / "binaries"
-    files = sorted(folder.glob("tiefmu.*"))
-    if not files:
-        raise UsageError(f"{folder}: the FMU's binary is not installed; install tiefmu again")
-    return files[0].read_bytes()
 
 
 def entry(name: str) -> zipfile.ZipInfo:

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from .errors import RunError
+from .platforms import LibraryError, here, library_of
 from .signals import Experiment, one_line
 
 LARGEST_BLOCK = 2**26  # bytes of rows handed on at a time
@@ -47,6 +48,11 @@ class Fmu:
         except Exception as error:
             self.__exit__()
             raise RunError(f"{self.name}: cannot be unpacked: {one_line(error)}") from None
+        try:
+            check_library(self.folder, self.description.coSimulation.modelIdentifier, self.name)
+        except RunError:
+            self.__exit__()
+            raise
         return self
 
     def __exit__(self, *_) -> None:
@@ -72,6 +78,35 @@ class Fmu:
         """startTime, stopTime, stepSize or tolerance of the default experiment."""
         value = getattr(self.description.defaultExperiment, key, None)
         return default if value is None else float(value)
+
+
+def check_library(folder: Path, identifier: str, name: str) -> None:
+    """Refuses an unpacked FMU whose library this process cannot load: some of them would end it. Raises RunError."""
+    import fmpy
+
+    mine = here()
+    binaries, file = folder / "binaries", identifier + mine.suffix
+    wanted = [binaries / mine.folder / file, binaries / fmpy.platform / file]
+    path = next((path for path in wanted if path.is_file()), None)
+    if path is None:
+        found = sorted(each.name for each in binaries.iterdir()) if binaries.is_dir() else []
+        raise RunError(
+            f"{name}: holds no library for this system (binaries/{mine.folder}/{file}); found "
+            f"{', '.join(found) or 'none'}"
+        )
+    where = f"{name}: {path.relative_to(folder).as_posix()}"
+    try:
+        system, machines = library_of(path.read_bytes())
+    except LibraryError as error:
+        raise RunError(f"{where}: {error}") from None
+    if system != mine.system or mine.machine not in machines:
+        raise RunError(
+            f"{where}: is a library for {system} on {' and '.join(sorted(machines))}, this is {mine.system} on "
+            f"{mine.machine}"
+        )
+    if path != wanted[1]:  # FMPy looks into linux64 on Arm, too
+        wanted[1].parent.mkdir(exist_ok=True)
+        wanted[1].write_bytes(path.read_bytes())
 
 
 class Slave:
