@@ -1,5 +1,6 @@
 // The functions of FMI 2.0 co-simulation. Each goes through `guard`: no exception leaves the library.
 #include <cstdio>
+#include <cstring>
 #include <exception>
 #include <type_traits>
 
@@ -22,6 +23,26 @@ static_assert(std::is_same_v<fmi2ValueReference, std::uint32_t> && std::is_same_
 
 namespace {
 
+// Hands a finished message to the caller. The callback takes a printf format, and not every importer reads the
+// arguments after it: the message is the format, its % doubled. No allocation: memory may be what is lacking.
+void deliver(const fmi2CallbackLogger callback, fmi2ComponentEnvironment environment, const char* instanceName,
+             fmi2Status status, const char* category, const char* message) noexcept {
+  if (!callback) return;
+  char format[4096];
+  if (std::strchr(message, '%')) {
+    std::size_t n = 0;
+    for (; *message && n + 2 < sizeof format; ++message) {
+      if (*message == '%') format[n++] = '%';
+      format[n++] = *message;
+    }
+    format[n] = 0;
+    message = format;
+  }
+  callback(environment, instanceName, status, category, message);
+}
+
+bool isBlank(const char* text) { return text[std::strspn(text, " \t\n\r\f\v")] == 0; }
+
 // Copied from the caller's callbacks; the environment goes back to it with every message.
 class CallbackLog final : public Log {
  public:
@@ -35,8 +56,7 @@ class CallbackLog final : public Log {
     const fmi2Status status = severity == Severity::error     ? fmi2Error
                               : severity == Severity::warning ? fmi2Warning
                                                               : fmi2OK;
-    // The callback takes a printf format; a message may hold any character.
-    if (callback_) callback_(environment_, instanceName_.c_str(), status, category, "%s", message);
+    deliver(callback_, environment_, instanceName_.c_str(), status, category, message);
   }
 
   fmi2CallbackLogger callback_;
@@ -91,14 +111,15 @@ fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2Str
   const auto fail = [&](const char* message) -> fmi2Component {
     char line[2000];
     std::snprintf(line, sizeof line, "fmi2Instantiate: %s", message);
-    if (functions && functions->logger)
-      functions->logger(functions->componentEnvironment, instanceName ? instanceName : "", fmi2Error, "logStatusError",
-                        "%s", line);
+    if (functions)
+      deliver(functions->logger, functions->componentEnvironment, instanceName ? instanceName : "", fmi2Error,
+              "logStatusError", line);
     return nullptr;
   };
   try {
     if (!functions) return fail("the callback functions are a null pointer");
     if (!instanceName) return fail("the instance name is a null pointer");
+    if (isBlank(instanceName)) return fail("the instance name is empty or blank");
     if (!fmuGUID) return fail("the GUID is a null pointer");
     if (!fmuResourceLocation) return fail("the resource location is a null pointer");
     if (fmuType != fmi2CoSimulation) return fail("only co-simulation is supported");

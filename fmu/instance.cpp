@@ -4,7 +4,6 @@
 #include <bit>
 #include <cmath>
 #include <cstring>
-#include <limits>
 
 namespace tiefmu {
 namespace {
@@ -77,59 +76,25 @@ void Instance::exitInitializationMode() {
                                 " s, limit of the integrator " + text(simulation.integratorLimit()) + " s";
     log->write(Severity::note, Category::stability, message.c_str());
   }
-  findHostStep();
+  host = hostStep(simulation);
   state = State::stepComplete;
-}
-
-// Theory (6.3) for what the host moves: it carries its declared mass and the lumped addition (theory 5), on the
-// declared stiffness and the slaves'. Where no mass is declared nothing is known.
-void Instance::findHostStep() {
-  const Model& model = simulation.model();
-  hostStep = std::numeric_limits<double>::infinity();
-  const auto consider = [&](double own, double added, double stiffness, int node, int port = -1) {
-    if (!(own > 0) || !(stiffness > 0)) return;
-    const double step = std::sqrt(2 * (own + added) / stiffness);
-    if (step >= hostStep) return;
-    hostStep = step;
-    hostNode = node;
-    hostPort = port;
-  };
-  std::vector<std::uint8_t> inPort(static_cast<std::size_t>(model.nodes()));
-  for (std::size_t p = 0; p < model.drivenPorts(); ++p) {
-    double own = 0, added = 0, stiffness = 0;
-    for (int i : model.ports[p].member) {
-      inPort[static_cast<std::size_t>(i)] = 1;
-      own += model.nodeMass[i];
-      added += simulation.field(Field::addedMass)[i];
-      stiffness += simulation.field(Field::stiffness)[i];
-    }
-    consider(own, added, stiffness, 0, static_cast<int>(p));
-  }
-  for (int group : {rotatingDrivenMaster, drivenMaster})
-    for (int i = model.begin[group]; i < model.begin[group + 1]; ++i) {
-      if (inPort[static_cast<std::size_t>(i)]) continue;
-      consider(model.nodeMass[i], simulation.field(Field::addedMass)[i], simulation.field(Field::stiffness)[i], i);
-      if (i < model.rotating())
-        consider(model.nodeInertia[i], simulation.field(Field::addedInertia)[i],
-                 simulation.field(Field::rotationalStiffness)[i], i);
-    }
 }
 
 void Instance::warnOfStep(double step) {
   if (warnedOfStep || !log->wants(Category::stability)) return;
   warnedOfStep = true;
   const Model& model = simulation.model();
-  const std::string whose = hostPort >= 0 ? "port '" + model.ports[static_cast<std::size_t>(hostPort)].name + "'"
-                                          : "driven master node " + std::to_string(model.nodeId[hostNode]);
+  const std::string whose = host.port >= 0 ? "port '" + model.ports[static_cast<std::size_t>(host.port)].name + "'"
+                                           : "driven master node " + std::to_string(model.nodeId[host.node]);
   const std::string message = "the communication step " + text(step) + " s is longer than the nodal time step " +
-                              text(hostStep) + " s of " + whose + ": an explicit host is unstable with it";
+                              text(host.step) + " s of " + whose + ": an explicit host is unstable with it";
   log->write(Severity::warning, Category::stability, message.c_str());
 }
 
 void Instance::reset() {
   simulation.reset();
   clock = {};
-  hostStep = std::numeric_limits<double>::infinity();
+  host = {};
   warnedOfStep = false;
   state = State::instantiated;
 }
@@ -191,8 +156,12 @@ void Instance::set(const std::uint32_t refs[], std::size_t count, const double v
       inputs = true;
     else if (range.causality == Causality::parameter && state != State::stepComplete)
       parameters = true;
-    else
+    else if (range.causality != Causality::parameter)
       refuseToSet(range, first);
+    else  // the value that it has may be set again: some importers set all parameters before every run
+      for (std::size_t k = 0; k < run; ++k)
+        if (values[i + k] != data[range.place + (first - range.first) + k])
+          refuseToSet(range, first + static_cast<std::uint32_t>(k));
     if (!allFinite(values + i, run)) refuseValue(first, values + i);
     runs.push_back({values + i, data + range.place + (first - range.first), run});
   });
@@ -211,7 +180,7 @@ void Instance::doStep(double point, double step) {
     throw Refused("the step ends at " + text(point + step) + " s, after the stop time " + text(clock.stop) + " s");
   if (point + step == point)
     throw Refused("the step size " + text(step) + " s is too small to move the time on from " + text(point) + " s");
-  if (step > hostStep) warnOfStep(step);
+  if (step > host.step) warnOfStep(step);
   try {
     simulation.step(step);
   } catch (const StepTooLong& e) {

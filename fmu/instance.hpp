@@ -3,13 +3,13 @@
 #pragma once
 
 #include <algorithm>
-#include <limits>
 #include <memory>
 #include <string>
 #include <unordered_map>
 #include <vector>
 
 #include "../modelDescription/variables.hpp"
+#include "../src/host_step.hpp"
 #include "log.hpp"
 #include "refused.hpp"
 #include "resource.hpp"
@@ -93,7 +93,6 @@ class Instance {
   std::size_t inputAt(std::uint32_t reference) const;  // its place
   void requireOutputs(const std::uint32_t references[], std::size_t count) const;
   void takeScratch(const std::uint32_t references[], std::size_t count, double values[]) const;
-  void findHostStep();
   void warnOfStep(double step);
 
   std::string guid;
@@ -104,8 +103,7 @@ class Instance {
   std::vector<Run> runs;        // of the present call of set
   std::vector<double> scratch;  // laid out like the simulation's array
   Clock clock;
-  double hostStep = std::numeric_limits<double>::infinity();  // the least that a driven master's stiffness allows, s
-  int hostNode = 0, hostPort = -1;                            // whose it is: a port's, else the node's
+  HostStep host;  // the least that a driven master's stiffness allows
   bool warnedOfStep = false;
   std::unordered_map<void*, std::unique_ptr<SavedState>> savedStates;
 };

@@ -7,10 +7,8 @@
 
 namespace tiefmu {
 
-// Path of a file in the resource folder, from its location: a file URI or a plain path.
-std::string resourcePath(const std::string& location, const char* file);
-
-// Throws ResourceError (also when the file cannot be read, or belongs to another GUID).
+// location: of the folder, a file URI or a plain path, in UTF-8. Throws ResourceError (also when the file cannot be
+// read, or belongs to another GUID).
 Resource loadResource(const std::string& location, const std::string& guid);
 
 }  // namespace tiefmu

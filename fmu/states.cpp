@@ -29,7 +29,7 @@ void Instance::setState(void* saved) {
   simulation.restore(s.simulation);
   state = s.state;
   clock = s.clock;
-  findHostStep();
+  host = hostStep(simulation);
 }
 
 void Instance::freeState(void** saved) {

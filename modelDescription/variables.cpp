@@ -132,6 +132,7 @@ class Blocks {
                       std::move(numbers),
                       std::move(ids),
                       {},
+                      model.settings.names,
                       0});
   }
 
@@ -147,6 +148,25 @@ std::string listedName(const Variable& v) {
   if (!v.group.empty()) return name;
   if (!name.empty()) name += '.';
   return name += v.name;
+}
+
+// master[1].v[3] -> master_1_v_3. Bytes of UTF-8 stay.
+std::string flat(const std::string& name) {
+  std::string out;
+  for (char c : name) {
+    const bool stays = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || (c & 0x80) != 0;
+    if (c != ']') out += stays ? c : '_';
+  }
+  return out;
+}
+
+// Any two names of variables differ where those of the ports do: what stands before and behind them has no variants.
+void checkFlatNames(const std::vector<ScenePort>& ports) {
+  for (std::size_t i = 0; i < ports.size(); ++i)
+    for (std::size_t j = 0; j < i; ++j)
+      if (flat(ports[i].name) == flat(ports[j].name))
+        throw SceneError("interface: port '" + ports[i].name + "': its flat name is that of port '" + ports[j].name +
+                         "'; give it another name");
 }
 
 void checkNames(const std::vector<std::string>& names, const char* list, bool extrasOnly, bool ports) {
@@ -172,19 +192,21 @@ void checkNames(const std::vector<std::string>& names, const char* list, bool ex
 std::vector<Block> variables(const Model& model, const Layout& layout) { return Blocks(model, layout).all(); }
 
 std::string variableName(const Block& block, std::size_t element, int component) {
-  if (block.prefix.empty()) return std::string(block.name);
   std::string name(block.prefix);
-  name += '[';
-  name += block.labels.empty() ? std::to_string(block.numbers[element]) : block.labels[element];
-  name += "].";
+  if (!block.prefix.empty()) {
+    name += '[';
+    name += block.labels.empty() ? std::to_string(block.numbers[element]) : block.labels[element];
+    name += "].";
+  }
   name += block.name;
-  if (block.components > 1) name.append("[").append(std::to_string(component + 1)).append("]");
-  return name;
+  if (!block.prefix.empty() && block.components > 1) name.append("[").append(std::to_string(component + 1)).append("]");
+  return block.names == Names::flat ? flat(name) : name;
 }
 
 void checkInterface(const Scene& scene) {
   checkNames(scene.settings.expose, "expose", true, !scene.ports.empty());
   checkNames(scene.settings.hide, "hide", false, !scene.ports.empty());
+  if (scene.settings.names == Names::flat) checkFlatNames(scene.ports);
 }
 
 }  // namespace tiefmu

@@ -5,6 +5,7 @@
 #include <memory>
 #include <string_view>
 
+#include "../src/host_step.hpp"
 #include "dependencies.hpp"
 #include "variables.hpp"
 
@@ -83,12 +84,13 @@ double fromText(const std::string& text) {
 
 struct Experiment { double step, stop; };
 
-// A thousand steps: of 1 ms, or where the step has a limit, of one substep rounded down to 1, 2 or 5 times a power of
-// ten.
+// A thousand steps: of 1 ms, or where the step has a limit, of one substep or of what an explicit host may take, the
+// shorter one, rounded down to 1, 2 or 5 times a power of ten.
 Experiment defaultExperiment(const Model& model, const Simulation& simulation) {
   double substep =
       model.settings.timeStep > 0 ? model.settings.timeStep : model.settings.safety * simulation.integratorLimit();
   if (!model.anyFree() || substep > 1e6) substep = 1e-3;
+  substep = std::min(substep, hostStep(simulation).step);
   char text[32];  // like 9.87e-07; its decimals are exact where those of log10 and pow are not
   const char* end = std::to_chars(text, text + sizeof text, substep, std::chars_format::scientific).ptr;
   const char* e = std::find(static_cast<const char*>(text), end, 'e') + 1;
@@ -352,7 +354,7 @@ struct Xml::Contents {
     std::size_t count = 0;
     for (const Block& b : blocks) count += b.count();
     // Structured names have numbers in brackets, where ports have names.
-    structuredNames = count <= mostStructuredNames && model.ports.empty();
+    structuredNames = model.settings.names == Names::structured && count <= mostStructuredNames && model.ports.empty();
   }
 };
 

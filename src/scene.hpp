@@ -22,6 +22,7 @@ enum class Reaction : std::uint8_t { loads, full, split };
 enum class Geometry : std::uint8_t { finite, small };
 enum class Position : std::uint8_t { integrated, input };
 enum class Method : std::uint8_t { centralDifference, symplecticEuler, nohBathe, rk4 };
+enum class Names : std::uint8_t { structured, flat };  // of the FMU's variables
 
 // The words of a scene file for an enumeration, in its order. Python calls the values so, with _ for -.
 template <class E> inline constexpr std::array<const char*, 0> words{};
@@ -35,6 +36,7 @@ template <> inline constexpr auto words<Geometry> = std::array{"finite", "small"
 template <> inline constexpr auto words<Position> = std::array{"integrated", "input"};
 template <>
 inline constexpr auto words<Method> = std::array{"central-difference", "symplectic-euler", "noh-bathe", "rk4"};
+template <> inline constexpr auto words<Names> = std::array{"structured", "flat"};
 
 struct SceneNodes {
   std::vector<std::int64_t> id;
@@ -94,9 +96,10 @@ struct Settings {
   Position position{};
   Vec3 gravity = Vec3::Zero();  // m/s2
   Method method{};
-  double timeStep = 0;                    // s; 0: safety * limit
-  double safety = 0;                      // above 0
-  int threads = 0;                        // from 1 to mostThreads; 0: one, and no parameter of the FMU
+  double timeStep = 0;  // s; 0: safety * limit
+  double safety = 0;    // above 0
+  int threads = 0;      // from 1 to mostThreads; 0: one, and no parameter of the FMU
+  Names names{};
   std::vector<std::string> expose, hide;  // names of modelDescription/table.hpp
 };
 
@@ -110,8 +113,8 @@ inline constexpr std::tuple settingsMembers{
     SettingsMember{"geometry", &Settings::geometry},  SettingsMember{"position", &Settings::position},
     SettingsMember{"gravity", &Settings::gravity},    SettingsMember{"method", &Settings::method},
     SettingsMember{"time_step", &Settings::timeStep}, SettingsMember{"safety", &Settings::safety},
-    SettingsMember{"threads", &Settings::threads},    SettingsMember{"expose", &Settings::expose},
-    SettingsMember{"hide", &Settings::hide}};
+    SettingsMember{"threads", &Settings::threads},    SettingsMember{"names", &Settings::names},
+    SettingsMember{"expose", &Settings::expose},      SettingsMember{"hide", &Settings::hide}};
 
 namespace detail {
 

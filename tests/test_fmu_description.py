@@ -355,6 +355,45 @@ def test_default_experiment(tmp_path):
     assert start == 0 and stop == pytest.approx(1000 * step, rel=1e-12)
     sprung["integrator"] = {"time_step": 2.3e-5}
     assert experiment(sprung)[:3] == (0, 0.02, 2e-5)
+    # What an explicit host may take, theory (6.3): sqrt(2 m/K) of the driven masters, with what the tie adds.
+    stiff = quad(rotations=False)
+    stiff["node"] = [{"nodes": "all", "mass": 0.5, "stiffness": 1e6}, {"nodes": [101], "mass": 0.0, "stiffness": 0.0}]
+    assert np.sqrt(2 * 0.5 / 1e6) == pytest.approx(1e-3)
+    assert experiment(stiff)[2] in (1e-3, 5e-4)  # the very limit, to rounding
+    stiff["node"][0]["stiffness"] = 9e6
+    assert experiment(stiff) == (0, 0.2, 2e-4, None)
+
+
+PORTS = {"ports": [{"name": "flange", "nodes": [11, 12, 13, 14]}, {"name": "left weld", "nodes": [101]}]}
+
+
+@pytest.mark.parametrize("scene", [quad("free"), quad(slaves=2), quad(interface=PORTS)], ids=["free", "driven", "ports"])
+def test_flat_names(scene, tmp_path):
+    """For tools that make buses of dots and brackets: the same variables under names of letters, digits and _."""
+    scene["node"][0]["mass"] = 1.0
+    shown = scene.get("interface", {})
+    shown["expose"] = ["slave.r", "energy", "power_residual", "drift", *(["port.r"] if shown else [])]
+    structured = Fmu(scene | {"interface": shown}, tmp_path)
+    flat = Fmu(scene | {"interface": shown | {"names": "flat"}}, tmp_path)
+    assert flat.description.variableNamingConvention == "flat"
+    names = [v.name for v in flat.description.modelVariables]
+    assert len(set(names)) == len(names) == len(structured.variables)
+    assert all(re.fullmatch(r"[A-Za-z]\w*", name, re.ASCII) for name in names)
+    for one, other in zip(structured.description.modelVariables, flat.description.modelVariables):
+        assert one.valueReference == other.valueReference and one.description == other.description
+        assert other.name == re.sub(r"[.\[ ]", "_", one.name).replace("]", "")
+    instances = [Instance(fmu).start() for fmu in (structured, flat)]
+    for instance in instances:
+        n = len(instance.fmu.names("input"))
+        assert instance.set(dict(zip(instance.fmu.names("input"), 0.1 * np.arange(n)))) == OK
+        assert instance.step(0, 1e-3) == OK
+    one, other = (instance.get(instance.fmu.names("output")) for instance in instances)
+    np.testing.assert_array_equal(one, other)
+    assert instances[1].set({names[0]: np.nan}) != OK and f"'{names[0]}'" in instances[1].errors()[-1]
+    terminals = etree.parse(str(flat.folder / "terminalsAndIcons" / "terminalsAndIcons.xml"))
+    assert {m.get("variableName") for m in terminals.iter("TerminalMemberVariable")} <= set(names)
+    for instance in instances:
+        instance.free()
 
 
 def test_only_what_is_built_is_promised(tmp_path):

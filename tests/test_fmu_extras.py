@@ -146,16 +146,69 @@ def test_reference_results_are_what_the_fmu_answers(path, tmp_path):
     )
     assert set(inputs.dtype.names[1:]) == set(fmu.names("input"))
     assert set(outputs.dtype.names[1:]) == set(fmu.names("output"))
-    values = [dict(zip(inputs.dtype.names[1:], row.tolist()[1:])) for row in inputs]
-    instance = Instance(fmu).start(values=values[0])
+    experiment = fmu.description.defaultExperiment
+    step, rows = float(experiment.stepSize), np.array(inputs.tolist())
+    np.testing.assert_array_equal(inputs["time"], outputs["time"])
+    assert inputs["time"][0] == 0 and inputs["time"][-1] == pytest.approx(float(experiment.stopTime), rel=1e-12)
+    each = round(inputs["time"][1] / step)
+    instance = Instance(fmu).start(values=dict(zip(inputs.dtype.names[1:], rows[0, 1:])))
     names = outputs.dtype.names[1:]
     np.testing.assert_array_equal(instance.get(names), outputs[0].tolist()[1:])
-    step = inputs["time"][1]
-    for k in range(len(inputs) - 1):
-        assert instance.set(values[k]) == OK
-        assert instance.step(inputs["time"][k], step) == OK, instance.log
-        np.testing.assert_array_equal(instance.get(names), outputs[k + 1].tolist()[1:])
+    for n in range(each * (len(rows) - 1)):
+        row, k = divmod(n, each)
+        values = rows[row] + k / each * (rows[row + 1] - rows[row])
+        assert instance.set(dict(zip(inputs.dtype.names[1:], values[1:]))) == OK
+        assert instance.step(n * step, step) == OK, instance.log
+        if k == each - 1:
+            np.testing.assert_array_equal(instance.get(names), outputs[row + 1].tolist()[1:])
     assert any(np.ptp(outputs[name]) > 0 for name in names)
+    instance.free()
+
+
+@pytest.mark.parametrize("name", ["rivet", "heavy_slave", "spotweld"])
+def test_reference_results_are_those_of_another_importer(name, tmp_path):
+    """FMPy interpolates the inputs itself. Then they are held for as long again, which must do no harm."""
+    fmu = Fmu(next(path for path in SCENES if path.stem == name), tmp_path)
+    inputs, outputs = (
+        table((fmu.folder / "extra" / "tiefmu" / f"reference_{what}.csv").read_bytes()) for what in ("in", "out")
+    )
+    experiment = fmu.description.defaultExperiment
+    step, stop = float(experiment.stepSize), float(experiment.stopTime)
+    result = fmpy.simulate_fmu(
+        str(fmu.folder), stop_time=2 * stop, output_interval=step, input=inputs, output=outputs.dtype.names[1:]
+    )
+    each = round(outputs["time"][1] / step)
+    for column in outputs.dtype.names[1:]:
+        own = outputs[column]
+        found = result[column][: each * len(own) : each]
+        np.testing.assert_allclose(found[1:], own[1:], rtol=0, atol=1e-6 * np.abs(own).max() + 1e-12, err_msg=column)
+        assert np.abs(result[column]).max() <= 10 * np.abs(own).max() + 1e-12, column
+
+
+def test_reference_inputs_are_motions_and_loads_that_a_part_could_see(files):
+    """From rest to rest; velocities add up to no way, and a turn by hundredths of a radian."""
+    scene, description, found = files
+    if "extra/tiefmu/reference_in.csv" not in found:
+        pytest.skip("too large for reference results")
+    inputs, outputs = (table(found[f"extra/tiefmu/reference_{what}.csv"]) for what in ("in", "out"))
+    step = inputs["time"][1]
+    for name in inputs.dtype.names[1:]:
+        values = inputs[name] - (inputs[name][0] if ".r[" in name else 0)
+        assert values[0] == values[-1] == 0 and np.ptp(values) > 0, name
+        if ".v[" in name or ".w[" in name:
+            assert abs(values.sum() * step) < 1e-3 * np.abs(values).sum() * step, name
+    for name in outputs.dtype.names[1:]:
+        if ".w[" in name and "spinning" not in scene.name:
+            assert np.abs(outputs[name]).sum() * step < 0.5, name
+    _ = description
+
+
+def test_the_default_experiment_brings_no_warning(files, tmp_path):
+    scene, description, _ = files
+    fmu = Fmu(next(path for path in SCENES if path.stem == scene.name), tmp_path)
+    instance = Instance(fmu, logging=True).start()
+    assert instance.step(0.0, float(description.defaultExperiment.stepSize)) == OK
+    assert [message for message in instance.log if message[2] != OK and message[3] == "logStability"] == []
     instance.free()
 
 

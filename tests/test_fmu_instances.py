@@ -125,12 +125,21 @@ def test_many_instances_in_any_order_of_death(fmu):
 # ------------------------------------------------------------------------------------------------------------ messages
 
 
-def test_messages_are_arguments_and_reach_their_owner(fmu):
+def test_messages_are_finished_and_reach_their_owner(fmu):
+    """Not every importer reads the arguments of a format: a message has none, and its % are doubled."""
     instance = Instance(fmu, name="a %s%n%d", environment=0x1234)
     assert instance.call("Terminate") == ERROR
     assert instance.log == [
-        (0x1234, "a %s%n%d", ERROR, "logStatusError", "%s", "fmi2Terminate: not allowed in state instantiated")
+        (0x1234, "a %s%n%d", ERROR, "logStatusError", text, text)
+        for text in ["fmi2Terminate: not allowed in state instantiated"]
     ]
+    for name in ("100%", "%n%s%%", "%" * 3000):  # a long one is cut, never inside a pair
+        instance.log.clear()
+        assert instance.call("SetDebugLogging", 1, c_size_t(1), (c_char_p * 1)(name.encode())) == ERROR
+        *_, form, text = instance.log[0]
+        assert text == form.replace("%%", "%") and form.count("%") == 2 * text.count("%")
+        assert text == f"fmi2SetDebugLogging: unknown log category '{name}'"[: len(text)]
+        assert len(text) > 1900 or text.endswith("'")
     instance.free()
 
 

@@ -22,7 +22,7 @@ def resources(fmu, tmp_path) -> Path:
 def refused(fmu, folder: Path) -> str:
     instance = Instance(fmu, location=folder.as_uri())
     assert instance.component is None
-    assert [message[2:5] for message in instance.log] == [(ERROR, "logStatusError", "%s")]
+    assert [message[2:4] for message in instance.log] == [(ERROR, "logStatusError")]
     assert "\n" not in instance.log[0][5]
     return instance.log[0][5]
 

@@ -292,6 +292,11 @@ CASES = {
         [{"name": "a", "nodes": [1]}, {"name": "a", "nodes": [2]}],
         "interface: port 'a': this name is repeated",
     ),
+    "ports of one flat name": (
+        ("interface",),
+        {"names": "flat", "ports": [{"name": "a b", "nodes": [1]}, {"name": "a_b", "nodes": [2]}]},
+        "interface: port 'a_b': its flat name is that of port 'a b'; give it another name",
+    ),
     "node in two ports": (
         ("interface", "ports"),
         [{"name": "a", "nodes": [1, 2]}, {"name": "b", "nodes": [3, 2]}],

@@ -178,6 +178,7 @@ KEYS = {
     ("integrator", "safety"): POSITIVE,
     ("integrator", "threads"): THREADS,
     ("interface",): TABLE,
+    ("interface", "names"): one_of("structured", "flat"),
     ("interface", "expose"): NAMES,
     ("interface", "hide"): NAMES,
     ("interface", "ports"): PORTS,

@@ -20,6 +20,7 @@ CHOICES = [
     (schema.Model, "geometry", _core.Geometry),
     (schema.Model, "position", _core.Position),
     (schema.Integrator, "method", _core.Method),
+    (schema.Interface, "names", _core.Names),
 ]
 
 
@@ -52,13 +53,14 @@ def test_every_key_arrives():
         "gravity": [1.0, 2.0, -3.0],
     }
     scene["integrator"] = {"method": "noh-bathe", "time_step": 0.25, "safety": 0.75, "threads": 3}
-    scene["interface"] = {"expose": ["energy"], "hide": ["slave.v"]}
+    scene["interface"] = {"names": "flat", "expose": ["energy"], "hide": ["slave.v"]}
     settings = Assembly(schema.parse(scene), Path(".")).settings()
     assert settings.inertia == _core.Inertia.consistent
     assert settings.reaction == _core.Reaction.split
     assert settings.geometry == _core.Geometry.small
     assert settings.position == _core.Position.input
     assert settings.method == _core.Method.noh_bathe
+    assert settings.names == _core.Names.flat
     np.testing.assert_allclose(settings.gravity, [1e3, 2e3, -3e3], rtol=1e-15)
     assert (settings.time_step, settings.safety, settings.threads) == (0.25e-3, 0.75, 3)
     assert (settings.expose, settings.hide) == (["energy"], ["slave.v"])

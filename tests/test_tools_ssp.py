@@ -3,6 +3,7 @@
 import importlib.util
 import zipfile
 from pathlib import Path
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -46,6 +47,18 @@ def test_the_structure_is_valid_and_complete(ssp, case):
     assert [part.name for part in system.elements] == ["host", "tie"]
     found = {(a.parent.name, a.name, b.parent.name, b.name) for a, b in get_connections(system)}
     assert found == set(map(tuple, case["connections"]))
+
+
+def test_omsimulator_finds_its_step(ssp):
+    """Its command line aborts without; where it stands is what OMSimulator writes itself. Not run here."""
+    with zipfile.ZipFile(ssp) as archive:
+        root = ElementTree.fromstring(archive.read("SystemStructure.ssd"))
+    names = {"ssd": build_ssp.SSP1 + "Description", "ssc": build_ssp.SSP1 + "Common", "oms": build_ssp.OMS}
+    path = (
+        "ssd:System/ssd:Annotations/ssc:Annotation[@type='org.openmodelica']/oms:Annotations/oms:SimulationInformation"
+    )
+    master = root.find(f"{path}/oms:FixedStepMaster", names)
+    assert float(master.get("stepSize")) == build_ssp.STEP
 
 
 def test_fmpy_runs_it(ssp, case):

@@ -14,8 +14,9 @@ import tiefmu
 
 HERE = Path(__file__).resolve().parent
 PARTS = ("host", "tie")
-STOP_TIME = 1.0  # s
+STOP_TIME, STEP = 1.0, 2**-9  # s
 SSP1 = "http://ssp-standard.org/SSP1/SystemStructure"
+OMS = "https://raw.githubusercontent.com/OpenModelica/OMSimulator/master/schema/oms.xsd"
 
 
 def connections(descriptions) -> list[tuple[str, str, str, str]]:
@@ -43,7 +44,7 @@ def structure(descriptions) -> str:
     fed = {(target, there) for _, _, target, there in connections(descriptions)}
     lines = [
         '<?xml version="1.0" encoding="UTF-8"?>',
-        f'<ssd:SystemStructureDescription xmlns:ssd="{SSP1}Description" xmlns:ssc="{SSP1}Common"'
+        f'<ssd:SystemStructureDescription xmlns:ssd="{SSP1}Description" xmlns:ssc="{SSP1}Common" xmlns:oms="{OMS}"'
         ' version="1.0" name="host_and_tie">',
         '  <ssd:System name="system">',
         "    <ssd:Elements>",
@@ -68,6 +69,11 @@ def structure(descriptions) -> str:
     ]
     lines += [
         "    </ssd:Connections>",
+        # OMSimulator's command line aborts without a step of its own; others pass over it.
+        '    <ssd:Annotations><ssc:Annotation type="org.openmodelica"><oms:Annotations><oms:SimulationInformation>',
+        f'      <oms:FixedStepMaster description="oms-ma" stepSize="{STEP}" absoluteTolerance="0.0001"'
+        ' relativeTolerance="0.0001"/>',
+        "    </oms:SimulationInformation></oms:Annotations></ssc:Annotation></ssd:Annotations>",
         "  </ssd:System>",
         f'  <ssd:DefaultExperiment startTime="0" stopTime="{STOP_TIME}"/>',
         "</ssd:SystemStructureDescription>",

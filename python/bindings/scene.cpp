@@ -146,6 +146,7 @@ void bindScene(nb::module_& m) {
   bindEnum<Geometry>(m, "Geometry", "Of displacements.");
   bindEnum<Position>(m, "Position", "Of driven nodes.");
   bindEnum<Method>(m, "Method", "Of integration.");
+  bindEnum<Names>(m, "Names", "Of the variables of an FMU.");
   bindSettings(m);
 
   nb::class_<Scene>(m, "Scene", "Nodes, segments, ties and springs as arrays, by index. SI units.")

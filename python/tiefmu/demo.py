@@ -1,5 +1,6 @@
 """Builds the example scenes, runs each as an FMU, checks what must hold in any run, writes CSVs and pictures."""
 
+import re
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -80,8 +81,13 @@ def check(result: Result) -> list[Check]:
         drift = result.largest("drift")
         checks.append(Check("offsets keep their length", drift <= 1e-12, f"{drift:.1e} m"))
     if "power_residual" in result.columns:
-        force = max((result.largest(name) for name in result.names if ".f[" in name), default=0.0)
-        speed = max((result.largest(name) for name in result.names if ".v[" in name), default=0.0)
+        force, speed = (
+            max(
+                (result.largest(name) for name in result.names if re.search(rf"[._]{kind}[\[_]\d\]?$", name)),
+                default=0.0,
+            )
+            for kind in "fv"  # in structured and in flat names
+        )
         residual = result.largest("power_residual") / max(force * speed, 1e-300)
         checks.append(Check("power in is power out", residual <= 1e-9, f"{residual:.1e}"))
     if "energy.residual" in result.columns:  # depends on the step

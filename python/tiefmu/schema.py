@@ -271,6 +271,7 @@ class Integrator(Table):
 
 
 class Interface(Table):
+    names: Literal["structured", "flat"] = "structured"
     expose: list[str] = []
     hide: list[str] = []
     ports: list[Port] = []

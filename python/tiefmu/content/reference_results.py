@@ -1,26 +1,31 @@
-"""Reference results: a short run of the scene with every input moving, for those who want to check an importer."""
+"""Reference results: the default experiment with every input moving, for those who want to check an importer.
 
-import math
+Only sums and products of doubles here: the same bytes on every machine, which NumPy's sines are not.
+"""
 
 import numpy as np
 
 from ..scene import Scene
 
 MOST_VARIABLES = 2000
-STEPS = 20
+ROWS = 50
+STEPS = 20  # communication steps of the default experiment between two rows
 TRAVEL = 0.01  # of driven nodes, in parts of the scene's size; also their turn, rad
 FOLDER = "extra/tiefmu"
 
 
 def reference(scene: Scene, step: float) -> dict[str, bytes]:
-    """reference_in.csv and reference_out.csv, or nothing where they would be large or the run fails. Row k of the
-    inputs is set at its time; row k + 1 of the outputs is what the FMU answers after the step from there to the
-    next."""
+    """reference_in.csv and reference_out.csv, or nothing where they would be large or the run fails.
+
+    step: communication step of the default experiment, s, which is ROWS * STEPS of it long. The inputs are linear
+    between their rows, those of a communication point set before the step from there. The outputs are what the FMU
+    answers at the end of the step that reaches their time; those of time 0 belong to the inputs of time 0.
+    """
     variables = scene.start.variables
     if sum(len(block["numbers"]) * block["components"] for block in variables) > MOST_VARIABLES:
         return {}
-    times = step * np.arange(STEPS + 1)
-    inputs = signals(scene, times)
+    inputs = signals(scene, ROWS * STEPS * step)
+    names, table = list(inputs), np.array(list(inputs.values())).reshape(len(inputs), -1).T
     outputs = [
         name
         for number, block in enumerate(variables)
@@ -28,60 +33,67 @@ def reference(scene: Scene, step: float) -> dict[str, bytes]:
         for name in scene.start.variable_names(number)
     ]
     simulation = scene.simulation()
-    answer = None
-    rows = []
     try:
-        for k in range(STEPS + 1):
-            if inputs:
-                simulation.set_values(list(inputs), np.array([values[k] for values in inputs.values()]))
-            if k == 0:
-                simulation.initialise(0.0)
-            rows.append(simulation.get_values(outputs) if k == 0 else answer)
-            if k < STEPS:
+        if names:
+            simulation.set_values(names, table[0])
+        simulation.initialise(0.0)
+        rows = [simulation.get_values(outputs)]
+        for row in range(ROWS):
+            for k in range(STEPS):
+                if names:
+                    simulation.set_values(names, table[row] + k / STEPS * (table[row + 1] - table[row]))
                 simulation.step(step)
-                answer = simulation.get_values(outputs)
+            rows.append(simulation.get_values(outputs))
     except RuntimeError:  # Diverged, or more substeps than any run could make
         return {}
+    times = STEPS * step * np.arange(ROWS + 1)
     return {
-        f"{FOLDER}/reference_in.csv": table(times, list(inputs), np.array(list(inputs.values())).T),
-        f"{FOLDER}/reference_out.csv": table(times, outputs, np.array(rows)),
+        f"{FOLDER}/reference_in.csv": csv(times, names, table),
+        f"{FOLDER}/reference_out.csv": csv(times, outputs, np.array(rows)),
     }
 
 
-def signals(scene: Scene, times: np.ndarray) -> dict[str, np.ndarray]:
-    """Name -> values over time: a sine with a phase of its own for each node and direction; positions, velocities and
-    accelerations are each other's derivatives."""
+def signals(scene: Scene, duration: float) -> dict[str, np.ndarray]:
+    """Name -> values at the rows: a pulse of its own for each node and direction, from rest to rest. Positions,
+    velocities and accelerations are each other's derivatives. Loads would move a mean mass by about TRAVEL of the
+    scene's size, and turn a mean inertia by TRAVEL, if nothing held them."""
     nodes, slaves = (scene.model.report()[what] for what in ("nodes", "slaves"))
     size = float(np.ptp(nodes["position"], axis=0).max()) or 1.0
-    mass = float(np.append(nodes["mass"], slaves["mass"]).mean())
-    omega = 2 * math.pi / times[-1]
-    force = mass * TRAVEL * size * omega**2 or 1.0
-    amplitude = {
-        "r": TRAVEL * size,
-        "v": TRAVEL * size * omega,
-        "a": TRAVEL * size * omega**2,
-        "w": TRAVEL * omega,
-        "z": TRAVEL * omega**2,
-        "f": force,
-        "t": force * size,
-    }
+    mass, inertia = (float(np.append(nodes[key], slaves[key]).mean()) for key in ("mass", "inertia"))
+    force = 5 * mass * TRAVEL * size / duration**2 or 1.0
+    amplitude = {"f": force, "t": 5 * inertia * TRAVEL / duration**2 or 0.1 * force * size}
+    for kind, order in (("r", 0), ("v", 1), ("a", 2)):
+        amplitude[kind] = TRAVEL * size / duration**order
+    for kind, order in (("w", 1), ("z", 2)):
+        amplitude[kind] = TRAVEL / duration**order
     found = {}
     for number, block in enumerate(scene.start.variables):
         if block["causality"] != "input":
             continue
         names = scene.start.variable_names(number)
         kind = block["name"].removeprefix(block["prefix"] + ".").removesuffix("_ext")
-        ahead = {"r": 0, "v": 1, "a": 2, "w": 1, "z": 2}.get(kind, 0) * math.pi / 2  # derivatives run ahead
-        start = scene.simulation().get_values(names) if kind == "r" else np.zeros(3 * len(block["numbers"]))
+        start = scene.start.get_values(names) if kind == "r" else np.zeros(3 * len(block["numbers"]))
         for k, name in enumerate(names):
-            phase = 0.7 * (3 * int(block["numbers"][k // 3]) + k % 3) + ahead
-            still = math.sin(phase) if kind == "r" else 0.0
-            found[name] = start[k] + amplitude[kind] * (np.sin(omega * times + phase) - still)
+            which = 3 * int(block["numbers"][k // 3]) + k % 3
+            found[name] = start[k] + amplitude[kind] * pulse(which)[{"v": 1, "a": 2, "w": 1, "z": 2}.get(kind, 0)]
     return found
 
 
-def table(times: np.ndarray, header: list[str], values: np.ndarray) -> bytes:
-    """CSV; every number reads back to the same double."""
+def pulse(which: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """gain (4 s (1 - s))^4 (1 + skew (2 s - 1)) at the rows, s from 0 to 1, and its first two derivatives by s."""
+    gain = (1 if which % 2 else -1) * (0.5 + (53 * which % 11) / 20)
+    skew = (37 * which % 21 - 10) / 10
+    s = np.arange(ROWS + 1) / ROWS
+    q, dq, tilt = 4 * s * (1 - s), 4 - 8 * s, 1 + skew * (2 * s - 1)
+    return (
+        gain * (q * q * q * q * tilt),
+        gain * (4 * q * q * q * dq * tilt + 2 * skew * q * q * q * q),
+        gain * (12 * q * q * dq * dq * tilt - 32 * q * q * q * tilt + 16 * skew * q * q * q * dq),
+    )
+
+
+def csv(times: np.ndarray, header: list[str], values: np.ndarray) -> bytes:
+    """Every number reads back to the same double."""
     lines = [",".join(["time", *header])]
     for time, row in zip(times.tolist(), values.tolist() or [[]] * len(times)):
         lines.append(",".join(map(repr, [time, *row])))

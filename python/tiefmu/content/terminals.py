@@ -7,25 +7,25 @@ def terminals(scene: Scene) -> bytes:
     """One terminal a port, a master (that has variables) and a slave, named like them. Members are called by what
     follows the node in the variable's name, e.g. v[1]: a tie's master matches any FMU with a terminal of the same
     members."""
-    members, ids = {}, {}  # of each (prefix, number, or name of a port); `#` stands for that
-    for block in scene.start.variables:
+    members, ids = {}, {}  # of each (prefix, number, or name of a port)
+    for number, block in enumerate(scene.start.variables):
         prefix = block["prefix"]
         if prefix not in ("master", "slave", "port"):
             continue
         short = block["name"].removeprefix(prefix + ".")
-        names = [f"{short}[{k}]" for k in (1, 2, 3)] if block["components"] == 3 else [short]
-        lines = "".join(
-            f'<TerminalMemberVariable variableName="{prefix}[#].{name}" memberName="{name}" variableKind="signal"/>\n'
-            for name in names
-        )
+        own = [f"{short}[{k}]" for k in (1, 2, 3)] if block["components"] == 3 else [short]
+        names = iter(scene.start.variable_names(number))
         for place, node in zip(block["labels"] or block["numbers"].tolist(), block["ids"].tolist()):
-            members.setdefault((prefix, place), []).append(lines)
+            members.setdefault((prefix, place), []).extend(
+                f'<TerminalMemberVariable variableName="{next(names)}" memberName="{member}" variableKind="signal"/>\n'
+                for member in own
+            )
             ids[prefix, place] = node
     parts = ['<?xml version="1.0" encoding="UTF-8"?>\n<fmiTerminalsAndIcons fmiVersion="3.0">\n<Terminals>\n']
     for prefix, place in sorted(members):
         node = "" if prefix == "port" else f", node {ids[prefix, place]}"
         parts.append(f'<Terminal name="{prefix}[{place}]" matchingRule="plug" description="{prefix}{node}">\n')
-        parts.append("".join(members[prefix, place]).replace("#", str(place)))
+        parts += members[prefix, place]
         parts.append("</Terminal>\n")
     parts.append("</Terminals>\n</fmiTerminalsAndIcons>\n")
     return "".join(parts).encode()
