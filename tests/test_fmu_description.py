@@ -367,7 +367,9 @@ def test_default_experiment(tmp_path):
 PORTS = {"ports": [{"name": "flange", "nodes": [11, 12, 13, 14]}, {"name": "left weld", "nodes": [101]}]}
 
 
-@pytest.mark.parametrize("scene", [quad("free"), quad(slaves=2), quad(interface=PORTS)], ids=["free", "driven", "ports"])
+@pytest.mark.parametrize(
+    "scene", [quad("free"), quad(slaves=2), quad(interface=PORTS)], ids=["free", "driven", "ports"]
+)
 def test_flat_names(scene, tmp_path):
     """For tools that make buses of dots and brackets: the same variables under names of letters, digits and _."""
     scene["node"][0]["mass"] = 1.0
