@@ -27,7 +27,7 @@ VARIANT = {
     for stem in re.findall(
         r"\w+",
         "sin cos sincos tan asin acos atan atan2 sinh cosh tanh asinh acosh atanh exp exp2 exp10 expm1 log log2 log10 "
-        "log1p pow cbrt hypot fma erf erfc tgamma lgamma cexp clog cpow carg csin ccos",
+        "log1p pow cbrt hypot fma erf erfc tgamma lgamma csqrt cabs cexp clog cpow carg csin ccos",
     )
     for suffix in ("", "f", "l")
 }
