@@ -25,6 +25,7 @@ def main(zig: Path, names: list[str]) -> int:
     unknown = [name for name in names if name not in BY_FOLDER]
     if unknown:
         return fail(f"platform '{unknown[0]}' is unknown; known: {', '.join(BY_FOLDER)}")
+    zig = zig.resolve()
     compiler = zig / ("zig.exe" if os.name == "nt" else "zig")
     if not compiler.is_file():
         return fail(f"{compiler}: no such file; the package ziglang brings it")
