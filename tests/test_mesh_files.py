@@ -279,3 +279,22 @@ def test_unreadable_mesh_files(tmp_path, name, text, capfd):
     assert str(error.value).startswith(f"scene: mesh: file: {tmp_path / name}: meshio cannot read it")
     assert "\n" not in str(error.value)
     assert capfd.readouterr() == ("", "")
+
+
+NASTRAN = "GRID,1,,0.,0.,0.\nGRID,2,,1.,0.,0.\nGRID,3,,0.,1.,0.\nGRID,4,,.2,.2,0.\nCTRIA3,5,1,1,2,3\n"
+IN_ABAQUS = "*NODE\n1,0,0,0\n2,1,0,0\n3,0,1,0\n4,.2,.2,0\n*ELEMENT, TYPE=S3\n5,1,2,3\n"
+
+
+@pytest.mark.parametrize("name, text", [("panel.inp", IN_ABAQUS), ("panel.bdf", NASTRAN)])
+def test_a_byte_order_mark_is_passed_over(tmp_path, name, text):
+    (tmp_path / name).write_text(text, encoding="utf-8-sig")
+    (tmp_path / "a.toml").write_text(
+        f'[mesh]\nfile = "{name}"\n[[tie]]\nslaves = [4]\nsegments = [5]\n', encoding="utf-8-sig"
+    )
+    assert [row["id"] for row in found(tmp_path / "a.toml")["slaves"]] == [4]
+
+
+def test_a_file_without_nodes_is_named(tmp_path):
+    (tmp_path / "none.inp").write_text("*HEADING\n")
+    with pytest.raises(tiefmu.SceneError, match=r"mesh: file: .*none\.inp: has no nodes; give nodes = "):
+        tiefmu.load({"mesh": {"file": str(tmp_path / "none.inp")}, "tie": [{"slaves": [1]}]})

@@ -9,7 +9,7 @@ import numpy as np
 import pyarrow.parquet
 import pytest
 import tiefmu
-from tiefmu import results, slave
+from tiefmu import key_figures, results, slave
 from tiefmu.cli import main
 from tiefmu.report import of_fmu
 from tiefmu.run import experiment, run, simulate
@@ -228,3 +228,11 @@ def test_no_object_is_made_in_a_step():
     assert pointer[0] == 0.0
     address.value += ctypes.sizeof(ctypes.c_double) * 2
     assert pointer[1] == 3.0
+
+
+@pytest.mark.parametrize("scale", [0.0, 1e-200, 1e-6, 0.5, 1e6])
+def test_the_largest_reaction_of_any_size(scale):
+    reactions = key_figures.Reactions(["master[7].f[1]", "master[7].f[2]", "master[7].f[3]"])
+    for time in (0.0, 1.0, 2.0):
+        reactions.write(np.array([[time, 0.0, (time % 2) * scale, 0.0]]))
+    assert reactions.where == "master[7].f" and reactions.time == (1.0 if scale > 1e-150 else 0.0)

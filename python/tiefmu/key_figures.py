@@ -20,15 +20,15 @@ class Reactions:
         self.names = [match[1] for match in map(REACTION.fullmatch, names) if match]
         column = {name: 1 + k for k, name in enumerate(names)}
         self.columns = np.array([[column[f"{name}[{k}]"] for k in (1, 2, 3)] for name in self.names], dtype=int)
-        self.largest, self.where, self.time = -1.0, "", 0.0
+        self.square, self.where, self.time = -1.0, "", 0.0
 
     def write(self, block: np.ndarray) -> None:
         if not self.names:
             return
         square = (block[:, self.columns] ** 2).sum(axis=2)
         row, place = np.unravel_index(np.argmax(square), square.shape)
-        if not square[row, place] <= self.largest**2:
-            self.largest, self.where = math.sqrt(square[row, place]), self.names[place]
+        if not square[row, place] <= self.square:
+            self.square, self.where = float(square[row, place]), self.names[place]
             self.time = float(block[row, 0])
 
 
@@ -62,7 +62,7 @@ def lines(fmu: Fmu, result: Result, reactions: Reactions, step: float) -> list[s
         part(result.largest("energy.residual"), energy_scale(result)) if "energy.residual" in result.columns else ""
     )
     words = {
-        "largest reaction": f"{reactions.largest:.6g} N at {reactions.where}{' ' + node[0] if node else ''}, "
+        "largest reaction": f"{math.sqrt(reactions.square):.6g} N at {reactions.where}{' ' + node[0] if node else ''}, "
         f"t = {reactions.time:.6g} s"
         if reactions.names
         else "none: no reaction is an output",

@@ -37,7 +37,8 @@ def build(table, folder: Path) -> Mesh:
         if table.nodes:
             mesh.add_nodes([row[0] for row in table.nodes], [row[1:] for row in table.nodes])
         if not len(mesh.node_id):
-            raise SceneError("has no nodes; give nodes = [[id, x, y, z], ...] or file")
+            file = f"file: {table.file}: " if table.file is not None else ""
+            raise SceneError(f"{file}has no nodes; give nodes = [[id, x, y, z], ...]{'' if file else ' or file'}")
         if table.segments:
             mesh.add_segments(
                 [row[0] for row in table.segments], [row[1:] + [0] * (5 - len(row)) for row in table.segments]

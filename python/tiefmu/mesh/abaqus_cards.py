@@ -117,7 +117,7 @@ class Reader:
         self.files += 1
         if self.files > MOST_INCLUDES:
             raise SceneError(f"*INCLUDE: more than {MOST_INCLUDES} files")
-        lines = path.read_text(encoding="utf-8", errors="replace").split("\n")
+        lines = path.read_text(encoding="utf-8-sig", errors="replace").split("\n")
         special = [i for i, line in enumerate(lines) if not line or (line[0] in "* \t\r" and not is_data(line))]
         done = 0
         for i in special:

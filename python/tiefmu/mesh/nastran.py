@@ -72,7 +72,7 @@ def read(path: Path) -> MeshFile:
 def included(path: Path, above: tuple[Path, ...]) -> list[str]:
     """Lines of the file and those that it includes, without comments."""
     try:
-        text = path.read_text(encoding="utf-8", errors="replace")
+        text = path.read_text(encoding="utf-8-sig", errors="replace")
     except OSError as error:
         if not above:
             raise
