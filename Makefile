@@ -1,6 +1,7 @@
 # make demo   set everything up, build the example scenes as FMUs, run them, write out/
 # make test   set everything up, with the tools below, run all tests
 # make instructions  compare instruction counts of the kernels with bench/instructions.csv; needs valgrind
+# make browser  open the page of tiefmu report in headless Chromium; part of make test where one is installed
 # make lint   clang-format, ruff and mypy find nothing (part of make test)
 # make format  what of that a program can mend
 # make tools  install other people's tools that the tests run FMUs in
@@ -22,13 +23,19 @@ SOURCES := CMakeLists.txt $(wildcard src/*.?pp modelDescription/*.?pp fmu/*.?pp 
 # Each set in an environment of its own; not compiled ahead, as most of their files are never imported.
 TOOLS := build/tools/importers/installed build/tools/cofmupy/installed
 
-.PHONY: demo test binaries test-linux test-windows test-arm instructions lint format tools study sanitize projections fuzz bench valgrind clean
+.PHONY: demo test binaries test-linux test-windows test-arm instructions lint format tools study sanitize projections fuzz bench valgrind browser chromium clean
 demo: $(VENV)/installed
 	$(BIN)/tiefmu demo --out out
 	$(BIN)/tiefmu accept examples/acceptance/weld.toml examples/acceptance/criteria.toml --pictures out/acceptance
+	$(BIN)/tiefmu report scenes/bracket.toml -o out/bracket.html
 
 test: $(VENV)/installed tools
 	$(BIN)/python -m pytest -n 2
+	@if command -v chromium >/dev/null; then $(BIN)/python -m pytest -m browser; \
+	  else echo "chromium is not installed: make browser opens the report in it"; fi
+
+browser: $(VENV)/installed chromium
+	$(BIN)/python -m pytest -m browser
 
 instructions: $(VENV)/installed valgrind
 	$(BIN)/python -m pytest -m instructions
@@ -105,6 +112,10 @@ tools: $(TOOLS)
 valgrind:
 	@command -v valgrind >/dev/null || (apt-get update && apt-get install --yes valgrind) >/dev/null 2>&1 || \
 	  { echo "valgrind is missing and could not be installed: apt-get install valgrind"; exit 1; }
+
+chromium:
+	@command -v chromium >/dev/null || (apt-get update && apt-get install --yes chromium) >/dev/null 2>&1 || \
+	  { echo "chromium is missing and could not be installed: apt-get install chromium"; exit 1; }
 
 build/tools/importers/installed: tests/tools/requirements.txt
 	$(PYTHON) -m venv --clear $(@D)

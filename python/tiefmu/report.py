@@ -15,25 +15,27 @@ MANY_VARIABLES = 10_000  # importers read them in seconds, masters connect them 
 SHOWN = 20  # slaves, masters, points and ids that the text shows; the dict has all
 
 
-def report(scene: Scene) -> dict:
+def report(scene: Scene, positions: bool = False) -> dict:
     """What became of the scene: ties, slaves, masters, points, limits, findings; plain lists and numbers, SI units.
 
     Keys are those of the JSON. Per slave: xi, eta of the projection and its distance; d = |offset|, to the
     projection (default) or the segment's barycentre (optimized); `weights` as the tie uses them (Phi, or 1/n);
     `added`: lumped mass and inertia on each master (theory 4). A step that nothing limits is 1e30; an infinite `cond`
-    or `lambda` is null. `position`: of masters and points at the start, where they are at most MOST_PLACES.
+    or `lambda` is null. `position`: of masters and points at the start, where they are at most MOST_PLACES, or
+    if asked for by `positions`. `interface`: the variables, a row a kind.
     """
     found = scene.model.report()
     slaves, nodes = found["slaves"], found["nodes"]
     by_id = np.argsort(slaves["id"], kind="stable")
     ports = {"ports": port_rows(scene, found)} if found["ports"] else {}
     variables = variable_counts(scene)
+    positions = positions or len(nodes["id"]) <= MOST_PLACES
     return {
         "title": scene.title,
         "ties": ties(scene, found),
         "slaves": slave_rows(scene, found, by_id),
-        "masters": node_rows(scene, nodes, master=True),
-        "points": node_rows(scene, nodes, master=False),
+        "masters": node_rows(scene, nodes, True, positions),
+        "points": node_rows(scene, nodes, False, positions),
         "springs": found["springs"],
         "dropped": [
             {"id": number, "tie": scene.ties[tie].name, "reason": reason} for number, tie, reason in found["dropped"]
@@ -46,6 +48,7 @@ def report(scene: Scene) -> dict:
         "integrator_limit": scene.start.integrator_limit,
         "freedoms": freedoms(scene, nodes),
         "variables": variables,
+        "interface": interface_rows(scene),
     } | ports
 
 
@@ -105,13 +108,13 @@ def finite(values: np.ndarray) -> list:
     return [value if known else None for value, known in zip(values.tolist(), np.isfinite(values).tolist())]
 
 
-def node_rows(scene: Scene, nodes: dict, master: bool) -> list[dict]:
+def node_rows(scene: Scene, nodes: dict, master: bool, positions: bool) -> list[dict]:
     """One row a master or point, by ascending number."""
     start, rotating = scene.start, nodes["rotating"]
     stiffness, added_mass = start.get("stiffness"), start.get("added_mass")
     added_inertia, rotational_stiffness = start.get("added_inertia"), start.get("rotational_stiffness")
     rows = []
-    places = rounded(nodes["position"]).tolist() if len(nodes["id"]) <= MOST_PLACES else None
+    places = rounded(nodes["position"]).tolist() if positions else None
     for i in np.argsort(nodes["number"], kind="stable").tolist():
         if bool(nodes["master"][i]) != master:
             continue
@@ -199,6 +202,25 @@ def variable_counts(scene: Scene) -> dict:
     for block in scene.start.variables:
         counts[block["name"]] = counts.get(block["name"], 0) + len(block["numbers"]) * block["components"]
     return counts
+
+
+def interface_rows(scene: Scene) -> list[dict]:
+    """A row a block of variables: its first name with i, j, p or the port for the node and k for the component, the
+    first value reference and how many follow."""
+    letters = {"master": "[i]", "slave": "[j]", "point": "[p]", "port": "[name]"}
+    rows = []
+    for block in scene.start.variables:
+        prefix, components = block["prefix"], block["components"]
+        name = block["name"].replace(prefix, prefix + letters[prefix], 1) if prefix in letters else block["name"]
+        rows.append(
+            {
+                "name": name + ("[k]" if components == 3 else ""),
+                "reference": int(block["reference"]),
+                "count": max(1, len(block["numbers"])) * components,
+                **{key: block[key] for key in ("causality", "unit", "description")},
+            }
+        )
+    return rows
 
 
 def size_warning(variables: int) -> list[str]:

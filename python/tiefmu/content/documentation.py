@@ -1,14 +1,13 @@
 """documentation/index.html: what the FMU is, for the person who got it without the scene."""
 
-from collections.abc import Callable
 from html import escape
 
-from ..html_page import bullets, document, paragraph, table
-from ..report import counted, step, summary
+from .. import sections
+from ..html_page import bullets, document, paragraph
+from ..report import step, summary
 from ..scene import Scene
 from .picture import Picture
 
-SHOWN = 200  # rows of a table; resources/report.json has all
 MOST_DRAWN = 2000  # segments and slaves in a drawing; beyond that the page shows model.png
 
 CONVENTIONS = """<h2>Signs and conventions</h2><ul>
@@ -48,16 +47,23 @@ def page(scene: Scene, found: dict, picture: Picture) -> bytes:
     small = len(picture.segments) + len(found["slaves"]) <= MOST_DRAWN
     body = [
         paragraph(f"A tied interface as an FMI 2.0 co-simulation FMU: {summary(found)}."),
+        *sections.remarks(found),
         picture.svg() if small else '<p><img src="../model.png" alt="the scene"></p>',
         "<h2>Ties</h2>",
-        *tables(found, ports),
+        sections.ties(found),
+        sections.slaves(found),
+        sections.masters(found),
+        sections.ports(found),
+        "<h2>What to look at</h2>",
+        *sections.worst(found),
         CONVENTIONS,
         "<h2>Settings</h2>",
         bullets(settings(scene, found) + (PORTS if ports else [])),
+        "<h2>Variables</h2>",
+        sections.interface(found),
     ]
-    for key in ("warnings", "notes"):
-        if found[key]:
-            body += [f"<h2>{key.capitalize()}</h2>", bullets([escape(line) for line in found[key][:SHOWN]])]
+    if found["notes"]:
+        body += ["<h2>Notes</h2>", bullets([escape(line) for line in found["notes"][: sections.SHOWN]])]
     body.append('<p><a href="licenses/license.txt">Licences</a></p>')
     return document(scene.title or scene.name, body).encode()
 
@@ -74,65 +80,3 @@ def settings(scene: Scene, found: dict) -> list[str]:
             "A communication step is divided into as many substeps as the limit asks."
         )
     return lines
-
-
-def tables(found: dict, ports: list[dict]) -> list[str]:
-    return [
-        first_rows(
-            "",
-            ["tie", "formulation", "search", "distance [m]", "segments", "slaves"],
-            found["ties"],
-            lambda row: [
-                row[key] for key in ("name", "formulation", "search", "search_distance", "segments", "slaves")
-            ],
-        ),
-        first_rows(
-            "Slaves: the segment each is tied to, its projection there, the length of its offset and the weights "
-            "of the segment's nodes.",
-            ["slave j", "node", "tie", "segment", "xi", "eta", "d [m]", "nodes", "weights"],
-            found["slaves"],
-            lambda row: [
-                *(row[key] for key in ("number", "id", "tie", "segment", "xi", "eta", "d")),
-                " ".join(map(str, row["nodes"])),
-                " ".join(f"{w:.4g}" for w in row["weights"]),
-            ],
-        ),
-        first_rows(
-            "Masters: who moves them, their own mass and what the tie adds.",
-            ["master i", "node", "motion", "rotations", "mass [kg]", "added mass [kg]", "added inertia [kg m2]"],
-            found["masters"],
-            lambda row: [
-                *(row[key] for key in ("number", "id", "motion")),
-                "yes" if row["rotations"] else "no",
-                *(row[key] for key in ("mass", "added_mass", "added_inertia")),
-            ],
-        ),
-        first_rows(
-            "Ports: nodes that the interface shows as one rigid body. Added: what the tie adds to a port of "
-            "driven nodes, with the centre of that mass and its moments and products of inertia about it (xx, "
-            "yy, zz, yz, zx, xy), at the start.",
-            ["port", "nodes", "reference point [m]", "added mass [kg]", "centre [m]", "inertia [kg m2]"],
-            ports,
-            lambda row: [
-                row["name"],
-                counted(len(row["nodes"]), "slave" if row["moves"] == "slaves" else "driven node"),
-                numbers(row["at"]),
-                row.get("added_mass", ""),
-                numbers(row.get("added_centre", [])),
-                numbers(row.get("added_inertia", [])),
-            ],
-        ),
-    ]
-
-
-def first_rows(caption: str, header: list[str], rows: list[dict], cells: Callable[[dict], list]) -> str:
-    """The first rows as a table, nothing where there are none."""
-    if not rows:
-        return ""
-    if len(rows) > SHOWN:
-        caption += f" The first {SHOWN} of {len(rows)}; resources/report.json has all."
-    return table(header, [cells(row) for row in rows[:SHOWN]], caption)
-
-
-def numbers(values: list[float]) -> str:
-    return " ".join(f"{value:.5g}" for value in values)
