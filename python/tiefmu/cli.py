@@ -1,4 +1,4 @@
-"""The command line: build, info, run, accept, report, demo, import, study, advise."""
+"""The command line: build, info, run, accept, report, sweep, demo, import, study, advise."""
 
 import argparse
 import json
@@ -21,6 +21,7 @@ from .report import counted, of_fmu, report, summary, text
 from .results import check_format
 from .run import run
 from .scene import load
+from .sweep import command as sweep_command
 from .view import page as report_command
 from .view.vtk import FIELDS, FRAMES, NODE_FIELDS, write_ties
 
@@ -140,6 +141,7 @@ def parser() -> argparse.ArgumentParser:
 
     accept_command.add_parser(commands)
     report_command.add_parser(commands)
+    sweep_command.add_parser(commands)
     import_command.add_parser(commands)
     study.add_parser(commands)
     advise.add_parser(commands)

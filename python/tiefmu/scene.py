@@ -52,16 +52,16 @@ class Scene:
         return _core.Simulation(self.model)
 
 
-def load(source, expose: Sequence[str] = ()) -> Scene:
+def load(source, expose: Sequence[str] = (), folder: Path | None = None) -> Scene:
     """Reads, checks and compiles a scene.
 
     source: path of a TOML file or of a deck (decks/), or a dict of the same shape (NumPy arrays may stand for lists;
-    messages call it "scene"; a mesh file is taken relative to the current folder). expose: added to [interface] expose
-    of a TOML file or a dict. Raises SceneError, one line
-    "FILE: table: id: message", on the first thing that is wrong.
+    messages call it "scene"; a mesh file is taken relative to `folder`, by default the current one). expose: added to
+    [interface] expose of a TOML file or a dict. Raises SceneError, one line "FILE: table: id: message", on the first
+    thing that is wrong.
     """
     if isinstance(source, dict):
-        file, name, folder = "scene", "scene", Path(".")
+        file, name, folder = "scene", "scene", folder or Path(".")
     else:
         file, name, folder = os.fspath(source), Path(source).stem, Path(source).parent
         if decks.is_deck(Path(source)):

@@ -1,0 +1,219 @@
+"""`tiefmu sweep`: cases in batches on dask.distributed."""
+
+import argparse
+import contextlib
+import hashlib
+import json
+import logging
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from ..acceptance import command as acceptance
+from ..arguments import check_folder_of, whole
+from ..errors import UsageError
+from ..results import needed
+from ..scene import load, read_toml
+from . import table, worker
+from .design import Case, Sweep, cases, read, variant
+from .journal import Journal
+
+BATCH = 100  # cases a task at most: the scheduler's part of a case stays below 0.1 ms
+AHEAD = 4  # tasks a worker waiting, so that 1e6 cases need no memory
+RETRIES = 3  # of the cases of a worker that died
+
+
+def add_parser(commands) -> None:
+    sweep = commands.add_parser(
+        "sweep",
+        help="run variants of a scene, on this machine or a cluster",
+        description="Runs the cases of a sweep file as FMUs on dask.distributed and writes a table with a row a case: "
+        "parameters, the numbers of the criteria, signals. docs/sweep.md.",
+        epilog="example: tiefmu sweep sweep.toml -o results.parquet --workers 8",
+    )
+    sweep.add_argument("sweep", metavar="SWEEP", type=Path, help="sweep file (TOML)")
+    sweep.add_argument("-o", "--output", metavar="FILE", type=Path, required=True, help="table, .parquet or .csv")
+    sweep.add_argument("--workers", metavar="N", type=whole, help="processes here (default: one a core)")
+    sweep.add_argument("--scheduler", metavar="TCP", help="an existing scheduler, tcp://HOST:PORT")
+    sweep.add_argument("--resume", action="store_true", help="go on with what an interrupted run has finished")
+    sweep.set_defaults(command=run_sweep)
+
+
+def run_sweep(options: argparse.Namespace) -> int:
+    needed("distributed", "sweep", "tiefmu sweep")
+    check_folder_of(options.output)
+    name, folder = str(options.sweep), options.sweep.parent
+    sweep = read(options.sweep)
+    table.check(options.output, bool(sweep.signals))
+    todo = cases(sweep, name)
+    task = shared(sweep, folder, name)
+    raw, files = scene_of(sweep, folder)
+    first_variant(raw, sweep, todo, folder, name)
+    journal = Journal(
+        options.output.with_name(f".{options.output.name}.journal"), digest(task, raw, files, todo), options.resume
+    )
+    left = [case for case in todo if case.number not in journal.rows]
+    try:
+        if left:
+            with client(options.scheduler, options.workers) as connected:
+                run_cases(connected, sweep, task, raw, files, left, len(todo), journal)
+    finally:
+        journal.close()
+    rows = [journal.rows[case.number] for case in todo]
+    parameters = {p.title: [case.values[k] for case in todo] for k, p in enumerate(sweep.parameter)}
+    table.write(options.output, parameters, rows)
+    journal.path.unlink()
+    stopped = sum(bool(row["message"]) for row in rows)
+    failed = sum(row.get("passed") is False for row in rows)
+    print(
+        f"{options.output}: {len(rows)} cases"
+        + (f", {failed} failed their criteria" if failed else "")
+        + (f", {stopped} stopped (see the column message)" if stopped else "")
+    )
+    return 0
+
+
+def shared(sweep: Sweep, folder: Path, name: str) -> worker.Task:
+    criteria = {}
+    if sweep.criteria:
+        packed = acceptance.packed(folder / sweep.criteria)
+        criteria = {path.removeprefix(acceptance.FOLDER + "/"): data for path, data in packed.items()}
+    files = {}
+    run = sweep.run.model_copy()
+    if run.input:
+        files["sweep_input.csv"] = (folder / run.input).read_bytes()
+        run.input = "sweep_input.csv"
+    return worker.Task(sweep.parameter, criteria, sweep.signals, run, files)
+
+
+def scene_of(sweep: Sweep, folder: Path) -> tuple[dict | bytes, dict[str, bytes]]:
+    """The scene as tables, with the files it names; or the FMU."""
+    path = folder / sweep.scene
+    if path.suffix.lower() == ".fmu":
+        return path.read_bytes(), {}
+    raw = read_toml(path)
+    mesh = raw.get("mesh", {}) if isinstance(raw.get("mesh"), dict) else {}
+    named = [mesh[key] for key in ("file", "properties") if isinstance(mesh.get(key), str)]
+    return raw, {file: (path.parent / file).read_bytes() for file in named if (path.parent / file).is_file()}
+
+
+def first_variant(raw: dict | bytes, sweep: Sweep, todo: list[Case], folder: Path, name: str) -> None:
+    """What is wrong with all cases is said before any runs. Raises UsageError, SceneError."""
+    if isinstance(raw, bytes):
+        return
+    try:
+        first = variant(raw, sweep, todo[0].values)
+    except UsageError as error:
+        raise UsageError(f"{name}: parameter {error}") from None
+    load(first, folder=(folder / sweep.scene).parent)
+
+
+def digest(task: worker.Task, raw: dict | bytes, files: dict[str, bytes], todo: list[Case]) -> str:
+    found = hashlib.sha256()
+    for part in (task.criteria, task.files, files):
+        for path, data in sorted(part.items()):
+            found.update(path.encode() + b"\0" + hashlib.sha256(data).digest())
+    found.update(raw if isinstance(raw, bytes) else json.dumps(raw, sort_keys=True, default=str).encode())
+    found.update(json.dumps([task.signals, task.run.model_dump(), [case.values for case in todo]]).encode())
+    found.update(json.dumps([parameter.model_dump() for parameter in task.parameters]).encode())
+    return found.hexdigest()
+
+
+@contextlib.contextmanager
+def client(scheduler: str | None, workers: int | None) -> Iterator[Any]:
+    """Raises UsageError where there is no such scheduler."""
+    import dask
+    from distributed import Client, LocalCluster
+
+    quiet = {"distributed.logging.distributed": "error", "distributed.scheduler.allowed-failures": RETRIES}
+    with dask.config.set(quiet):
+        if scheduler:
+            try:
+                with Client(scheduler, timeout=10) as connected:
+                    yield connected
+            except OSError as error:
+                raise UsageError(f"--scheduler {scheduler}: {error or 'no answer'}") from None
+            return
+        with (
+            LocalCluster(
+                n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=None,
+                silence_logs=logging.CRITICAL,
+            ) as cluster,
+            Client(cluster) as connected,
+        ):  # fmt: skip
+            yield connected
+
+
+def run_cases(
+    connected: Any, sweep: Sweep, task: worker.Task, raw: dict | bytes, files: dict, left: list[Case], total: int,
+    journal: Journal,
+) -> None:  # fmt: skip
+    """Batches of cases of one variant, so many at a time that all workers have work."""
+    from distributed import as_completed
+    from tqdm import tqdm
+
+    batches = batched(sweep, left)
+    # hash=False: two calls with the same bytes are two futures, and one of a lost worker is not waited for
+    sent_task = connected.scatter(task, broadcast=True, hash=False)
+    sent_files = connected.scatter(files, hash=False)
+    given = connected.scatter(raw, hash=False) if isinstance(raw, bytes) else None
+    variants: dict[str, Any] = {}
+    running: dict[Any, list[Case]] = {}
+    done = as_completed()
+
+    def submit(batch: list[Case], again: bool = False) -> None:
+        fmu = given
+        if fmu is None:
+            key = scene_key(sweep, batch[0])
+            if key not in variants:
+                while len(variants) > 4 * BATCH:
+                    variants.pop(next(iter(variants)))  # what is needed lives on in the tasks that wait for it
+                assert isinstance(raw, dict)
+                made = variant(raw, sweep, batch[0].values)
+                variants[key] = connected.submit(worker.build_variant, made, sent_files, pure=False)
+            fmu = variants[key]
+        pairs = [(case.number, case.values) for case in batch]
+        future = connected.submit(worker.run_batch, fmu, sent_task, pairs, pure=False)
+        running[future] = batch
+        done.add(future)
+
+    with tqdm(total=total, initial=total - len(left), unit="case", delay=1, disable=None, leave=False) as bar:
+
+        def fill() -> None:
+            most = AHEAD * max(1, len(connected.scheduler_info(n_workers=-1)["workers"]))
+            while len(running) < most:
+                batch = next(batches, None)
+                if batch is None:
+                    return
+                submit(batch)
+
+        fill()
+        while running:
+            future = next(done)
+            batch = running.pop(future)
+            try:
+                rows = future.result()
+            except Exception as error:  # KilledWorker: a case takes its worker down; which one, is found alone
+                if len(batch) > 1:
+                    for case in batch:
+                        submit([case])
+                    continue
+                rows = [(batch[0].number, {"message": f"its worker died: {' '.join(str(error).split())[:200]}"})]
+            journal.add(rows)
+            bar.update(len(rows))
+            fill()
+
+
+def scene_key(sweep: Sweep, case: Case) -> str:
+    return json.dumps([value for p, value in zip(sweep.parameter, case.values) if p.scene])
+
+
+def batched(sweep: Sweep, left: list[Case]) -> Iterator[list[Case]]:
+    """Cases of one variant together, at most BATCH; small sweeps in smaller ones, so that each worker gets some."""
+    groups: dict[str, list[Case]] = {}
+    for case in left:
+        groups.setdefault(scene_key(sweep, case), []).append(case)
+    size = max(1, min(BATCH, len(left) // 32))
+    for group in groups.values():
+        for first in range(0, len(group), size):
+            yield group[first : first + size]

@@ -1,0 +1,144 @@
+"""What runs on a worker: the FMU of a variant is built once and unpacked once; instances are reset between cases."""
+
+import copy
+import hashlib
+import tempfile
+import threading
+import uuid
+from pathlib import Path
+
+import numpy as np
+
+from ..acceptance.criteria import read
+from ..acceptance.judge import Judge
+from ..errors import RunError, SceneError, StepTooLong, UsageError
+from ..package import build
+from ..run import experiment, simulate
+from ..scene import load
+from ..signals import Experiment
+from ..slave import Fmu, Slave
+
+KEPT = 16  # unpacked FMUs that a thread of a worker holds
+_here = threading.local()  # an instance belongs to one thread
+
+
+def build_variant(raw: dict, files: dict[str, bytes]) -> bytes | str:
+    """The FMU of a scene as bytes, or the message of what is wrong with it. files: what the scene names."""
+    with tempfile.TemporaryDirectory(prefix="tiefmu-") as folder:
+        for name, data in files.items():
+            path = Path(folder) / name
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(data)
+        try:
+            scene = load(raw, folder=Path(folder))
+            return build(scene, Path(folder) / "variant.fmu").read_bytes()
+        except (SceneError, UsageError) as error:
+            return str(error)
+
+
+class Task:
+    """What all cases of a sweep share. criteria: path -> bytes of the criteria and their files; run: stop time, step,
+    name of the input among `files`; key: its own."""
+
+    def __init__(self, parameters, criteria: dict[str, bytes], signals: list[str], run, files: dict[str, bytes]):
+        self.parameters, self.criteria, self.signals, self.run, self.files = parameters, criteria, signals, run, files
+        self.key = uuid.uuid4().hex
+
+
+class Ready:
+    """An unpacked FMU with an instance, and all that its cases need."""
+
+    def __init__(self, data: bytes, task: Task):
+        self._folder = tempfile.TemporaryDirectory(prefix="tiefmu-")
+        self.folder = Path(self._folder.name)
+        (self.folder / "variant.fmu").write_bytes(data)
+        for name, content in (task.criteria | task.files).items():
+            path = self.folder / name
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(content)
+        self.fmu = Fmu(self.folder / "variant.fmu", "FMU")
+        self.fmu.__enter__()
+        inputs = self.folder / task.run.input if task.run.input else None
+        if task.criteria:
+            path = self.folder / "criteria.toml"
+            self.judge: Judge | None = Judge(self.fmu, read(path), self.folder, "criteria")
+            plan = self.judge.plan(task.run.stop_time, task.run.step, inputs)
+            wanted = set(self.judge.outputs) | set(task.signals)
+        else:
+            self.judge = None
+            plan, wanted = experiment(self.fmu, task.run.stop_time, task.run.step, inputs), set(task.signals)
+        self.plan = plan
+        known = self.fmu.outputs()
+        missing = next((name for name in task.signals if name not in known), None)
+        if missing:
+            raise UsageError(f"signals: '{missing}': no such output")
+        self.outputs = [name for name in known if name in wanted]
+        if self.judge:
+            self.judge.outputs = self.outputs
+        self.slave: Slave | None = None
+
+    def close(self) -> None:
+        if self.slave:
+            self.slave.free()
+        self.fmu.__exit__()
+        self._folder.cleanup()
+
+    def run(self, task: Task, values: list) -> dict:
+        """A row of the table: numbers, passed, message. A run that stops is a row with its message."""
+        factors = np.ones(len(self.plan.inputs.names))
+        start_values = {}
+        for parameter, value in zip(task.parameters, values):
+            if parameter.input:
+                chosen = [parameter.input in ("*", name) for name in self.plan.inputs.names]
+                factors[chosen] *= value
+            elif parameter.start:
+                start_values[parameter.start] = float(value)
+        inputs = copy.copy(self.plan.inputs)
+        inputs.table = inputs.table * factors
+        plan = Experiment(self.plan.start, self.plan.stop, self.plan.step, inputs)
+        row: dict = {"message": ""}
+        try:
+            if self.slave:
+                self.slave.reset()
+            else:
+                self.slave = Slave(self.fmu, self.outputs)
+            if self.judge:
+                judgement = self.judge.judge(self.slave, plan, start_values=start_values)
+                row["passed"] = judgement.passed
+                row |= {verdict.name: float(verdict.value) for verdict in judgement.verdicts}
+                result = judgement.result
+            else:
+                result = simulate(self.slave, plan, self.outputs, start_values=start_values)
+            for name in task.signals:
+                row.setdefault("time", result["time"].tolist())
+                row[name] = result[name].tolist()
+        except (RunError, UsageError, StepTooLong) as error:
+            row = {"message": str(error)}
+            if self.slave:  # it may be in any state
+                self.slave.free()
+                self.slave = None
+        return row
+
+
+def ready(data: bytes, task: Task) -> Ready:
+    """Unpacked before, or now; the oldest goes where there are too many."""
+    if not hasattr(_here, "held"):
+        _here.held = {}
+    held: dict[str, Ready] = _here.held
+    key = task.key + hashlib.sha256(data).hexdigest()
+    if key not in held:
+        while len(held) >= KEPT:
+            held.pop(next(iter(held))).close()
+        held[key] = Ready(data, task)
+    return held[key]
+
+
+def run_batch(data: bytes | str, task: Task, cases: list[tuple[int, list]]) -> list[tuple[int, dict]]:
+    """Number and row of each case. data: of build_variant."""
+    if isinstance(data, str):
+        return [(number, {"message": data}) for number, _ in cases]
+    try:
+        held = ready(data, task)
+    except (RunError, UsageError) as error:
+        return [(number, {"message": str(error)}) for number, _ in cases]
+    return [(number, held.run(task, values)) for number, values in cases]
