@@ -153,10 +153,9 @@ def run_cases(
     from tqdm import tqdm
 
     batches = batched(sweep, left)
-    # hash=False: two calls with the same bytes are two futures, and one of a lost worker is not waited for
-    sent_task = connected.scatter(task, broadcast=True, hash=False)
-    sent_files = connected.scatter(files, hash=False)
-    given = connected.scatter(raw, hash=False) if isinstance(raw, bytes) else None
+    # Not by scatter: what a lost worker held is then lost, while a task is done again.
+    sent_task, sent_files = (connected.submit(worker.given, data, pure=False) for data in (task, files))
+    given = connected.submit(worker.given, raw, pure=False) if isinstance(raw, bytes) else None
     variants: dict[str, Any] = {}
     running: dict[Any, list[Case]] = {}
     done = as_completed()

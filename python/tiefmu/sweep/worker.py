@@ -22,6 +22,11 @@ KEPT = 16  # unpacked FMUs that a thread of a worker holds
 _here = threading.local()  # an instance belongs to one thread
 
 
+def given(data):
+    """What the client has, as a task: a worker gets it once."""
+    return data
+
+
 def build_variant(raw: dict, files: dict[str, bytes]) -> bytes | str:
     """The FMU of a scene as bytes, or the message of what is wrong with it. files: what the scene names."""
     with tempfile.TemporaryDirectory(prefix="tiefmu-") as folder:
