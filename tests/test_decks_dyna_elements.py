@@ -345,6 +345,15 @@ def test_sections_that_are_not_understood(tmp_path):
     )
 
 
+@pytest.mark.parametrize("second", [("sr", "SECTION_01", 0.1), ("rrrr", 0.1, 0.1, 0.1, 0.1)])
+def test_beam_sections_that_are_not_understood(tmp_path, second):
+    made = DynaDeck().elastic(1, RHO, E, NU).part()
+    made.block("SECTION_BEAM", ("iirrr", 1, 1 if second[0] == "rrrr" else 2, 1.0, 2.0, 2.0), second)
+    found, deck = read(made.block("ELEMENT_BEAM", ("I" * 4, 1, 1, 1, 2)), tmp_path, LINE)
+    close(found[1], m=0.0, k=0.0)
+    assert any("this section is not understood" in line for line in deck.warnings)
+
+
 def test_decks_module_reads_the_same(tmp_path):
     made = base(thickness=0.1).elements("SHELL", 1, {1: (1, 2, 3, 4)}).nodes(SQUARE | {11: (1, 0.5, 0)})
     made.list_of("NODE", 1, [11]).tie().block("ELEMENT_MASS", ("IIR", 9, 11, 0.5)).write(tmp_path / "deck.k")

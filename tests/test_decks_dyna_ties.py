@@ -381,3 +381,45 @@ def test_birth_and_death(tmp_path):
         "CONTACT_TIED_NODES_TO_SURFACE", ("i" * 4, 99, 1, 4, 3), ("r" * 8, *[0.0] * 6, 0.1, 0.5), ("r", 1.0)
     )
     assert any("birth and death times are left aside" in line for line in read(made, tmp_path).deck.warnings)
+
+
+# ties of whole parts
+
+
+def tower(order=("low", "high")) -> DynaDeck:
+    """Three parts of bricks on each other, 0.01 apart, tied as whole parts: the middle one is a slave below and a
+    master above."""
+    corners = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)]
+    made = DynaDeck().elastic().solid(1)
+    for part, (size, base) in enumerate([(4.0, 0.0), (2.0, 4.01), (1.0, 6.02)], 1):
+        ids = [100 * part + i for i in range(8)]
+        made.nodes(
+            {n: tuple(np.round(np.array(c) * size + (0.1 * part, 0.1 * part, base), 6)) for n, c in zip(ids, corners)}
+        )
+        made.part(part).elements("SOLID", part, {part: tuple(ids)})
+    ties = {"low": (2, 1, (3, 3), 1, "low"), "high": (3, 2, (3, 3), 2, "high")}
+    for name in order:
+        made.tie(*ties[name], "TIED_SURFACE_TO_SURFACE_CONSTRAINED_OFFSET")
+    return made
+
+
+@pytest.mark.parametrize("order", [("low", "high"), ("high", "low")])
+def test_a_part_that_is_slave_of_one_and_master_of_another(tmp_path, order):
+    found = read(tower(order), tmp_path)
+    sets = {name: ids.tolist() for name, ids in found.scene.node_sets.items()}
+    assert sets == {"low slaves": [200, 201, 202, 203], "high slaves": [300, 301, 302, 303]}
+    rows = found.scene.segments[np.isin(found.scene.segment_id, found.scene.segment_sets["high"])]
+    assert [set(row) for row in rows.tolist()] == [{204, 205, 206, 207}]
+    assert any("of its 6 segments the 1 that hold slaves are taken" in line for line in found.deck.notes)
+    decks.compiled(found)
+
+
+def test_a_part_that_is_the_slave_of_two_ties(tmp_path):
+    made = tower(("low",)).tie(2, 3, (3, 3), 2, "high", "TIED_SURFACE_TO_SURFACE_CONSTRAINED_OFFSET")
+    made.lines = [line.replace("6.02", "9.02") for line in made.lines]  # the upper part away: nothing is in reach
+    with pytest.raises(decks.SceneError, match="tie 'high'"):
+        read(made, tmp_path)
+    made = tower(("low",)).nodes({1: (0, 0, 6.02), 2: (5, 0, 6.02), 3: (5, 5, 6.02), 4: (0, 5, 6.02)})
+    made.segments(5, [(1, 2, 3, 4)]).tie(2, 5, (3, 0), 2, "high", "TIED_SURFACE_TO_SURFACE_CONSTRAINED_OFFSET")
+    sets = {name: ids.tolist() for name, ids in read(made, tmp_path).scene.node_sets.items()}
+    assert sets == {"low slaves": [200, 201, 202, 203], "high slaves": [204, 205, 206, 207]}

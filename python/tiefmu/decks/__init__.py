@@ -5,9 +5,12 @@ masses, inertias and stiffnesses; to_scene.py makes the scene of its ties; settl
 segment; write.py puts it into files.
 """
 
+import dataclasses
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
+
+import numpy as np
 
 from .._core import SceneError
 from . import abaqus, dyna, radioss, to_scene, write
@@ -55,10 +58,55 @@ def read(path: Path, ties: list[str] | None = None, free: tuple[str, ...] = ()) 
             "*TIE can be imported"
         )
     deck = reader.read(path, str(path), ties)
+    untangle(deck)
     found = Imported(deck, to_scene.convert(deck, free))
     if found.scene.pairwise:
         settle(deck, found.scene, compiled(found))
     return found
+
+
+def untangle(deck: Deck):
+    """Ties of whole parts share nodes far from where they hold. Where that is so, ties with a tolerance per pair keep
+    the slaves within it and the segments that these find."""
+    if len(deck.ties) < 2:
+        return
+    slave, master = np.zeros((2, len(deck.node_id)), np.int64)
+    for tie in deck.ties:
+        slave[np.setdiff1d(tie.slaves, tie.faces.nodes)] += 1
+        master[np.unique(tie.faces.nodes[tie.faces.nodes >= 0])] += 1
+    shared = (slave > 1) | ((slave > 0) & (master > 0))
+    for tie in deck.ties:
+        corners = tie.faces.nodes
+        crossed = bool((shared[corners] & (corners >= 0)).any())
+        if tie.pairwise is None or not (crossed or shared[tie.slaves].any()):
+            continue
+        # the tie alone, without elements: its own distances
+        slaves = np.setdiff1d(tie.slaves, corners)
+        alone = Deck(deck.file, deck.language, units=deck.units, node_id=deck.node_id, position=deck.position)
+        alone.ties = [dataclasses.replace(tie, slaves=slaves, adjust=False)]
+        alone.added_mass = [(np.arange(len(deck.node_id)), 1.0)]
+        try:
+            found = Imported(alone, to_scene.convert(alone))
+            segments, scene = found.scene.pairwise[tie.name]["segment"], compiled(found)
+            settle(alone, found.scene, scene)
+        except SceneError:
+            continue  # none of them is near, which is said later
+        kept = next(iter(found.scene.node_sets.values()))
+        rows = scene.model.report()["slaves"]
+        used = np.isin(segments, rows["segment"][np.isin(rows["id"], kept)])
+        if len(kept) < len(slaves):
+            lost = np.setdiff1d(deck.node_id[slaves], kept)
+            deck.warn(
+                f"{tie.where}: tie '{tie.name}': {len(lost)} slaves, the first is node {lost[0]}, are farther from the "
+                "surface than their tolerance and are dropped"
+            )
+        tie.slaves = deck.nodes(kept, tie.where)
+        if crossed and not used.all():
+            tie.faces = tie.faces.take(used)
+            deck.notes.append(
+                f"tie '{tie.name}': of its {len(used)} segments the {used.sum()} that hold slaves are taken, as others "
+                "belong to slaves of other ties"
+            )
 
 
 def load(path: Path, ties: list[str] | None = None, free: tuple[str, ...] = ()):

@@ -166,7 +166,23 @@ def read_ties(deck: Deck, sets: Sets, tables: Tables, blocks: list[Block], wante
             choice.add(tie, contact.number)
             offsets[tie.name] = kind.offset
     choice.finish()
+    say_beams(deck)
     return offsets
+
+
+def say_beams(deck: Deck):
+    """Beams between slaves, such as those of spot welds, are no springs of the scene."""
+    slaves = np.unique(np.concatenate([tie.slaves for tie in deck.ties]))
+    for kind in ("beam", "truss"):
+        elements = deck.elements.get(kind)
+        if elements is None:
+            continue
+        held = np.isin(elements.nodes, slaves).any(axis=1)
+        if held.any():
+            deck.notes.append(
+                f"{held.sum()} {kind}s at slaves, the first is element {elements.id[np.argmax(held)]}, are the host's: "
+                "their masses are in the scene, their forces are inputs"
+            )
 
 
 def read_masses(deck: Deck, sets: Sets, of):

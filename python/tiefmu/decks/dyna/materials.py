@@ -153,8 +153,8 @@ def constants(deck, found: Materials, block: Block, first: int, material: Materi
     if law == 20:
         cmo, con1, con2 = block.or_blank(first + 1, "rrr")
         found.rigid[material.id] = (cmo, con1, con2)
-    if law == 100 and a[5]:
-        deck.warn(f"{block.where}: masses that its time step {a[5]:g} would add are left out")
+    if law == 100 and a[4] > 0:
+        deck.warn(f"{block.where}: masses that its time step {a[4]:g} would add are left out")
 
 
 def translations_rotations(found: Materials, block: Block, first: int, ident: int):

@@ -186,7 +186,7 @@ class Tables:
         part = self.deck.parts[number]
         section = self.deck.properties.get(part.property)
         if section is None or section.values.get("elform") != 6:
-            return "truss" if section is not None and section.kind == "truss" else "beam"
+            return "truss" if section is not None and section.kind in ("truss", "other") else "beam"
         material = self.deck.materials.get(part.material)
         k, c = self.materials.beams.get(part.material, ([0.0] * 6, [0.0] * 6))
         v = section.values
