@@ -31,7 +31,7 @@ class Library:
 def source_hash(root: Path = CHECKOUT) -> str:
     """Of everything that the libraries are made from."""
     digest = hashlib.sha256()
-    for path in sorted(path for pattern in SOURCES for path in root.glob(pattern)):
+    for path in sorted(path for pattern in SOURCES for path in root.glob(pattern) if path.is_file()):
         digest.update(path.relative_to(root).as_posix().encode() + b"\0" + path.read_bytes())
     return digest.hexdigest()
 
