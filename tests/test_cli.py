@@ -95,6 +95,25 @@ def test_build_of_many_variables_names_ports_as_the_cure(weld, scene_file, capsy
     assert line.startswith("warning: weld.toml: interface: 10006 variables") and "'ports' in [interface]" in line
 
 
+def test_build_shows_ten_warnings_of_a_kind(weld, scene_file, capsys):
+    """40 slaves 0.003 beyond the edge of a square of 0.1, that is xi = 1.06."""
+    ids = list(range(101, 141))
+    weld["mesh"]["nodes"][4:] = [[i, 0.103, 0.1 * k / 40, 0.0] for k, i in enumerate(ids)] + [[900, 0.05, 0.05, 0.01]]
+    weld["tie"][0]["slaves"] = [*ids, 900]
+    name = scene_file(weld)
+    assert main(["build", name]) == 0
+    lines = capsys.readouterr().err.splitlines()
+    assert all("lies outside segment 1 (xi = 1.06" in line for line in lines[:10])
+    assert lines[10] == "warning: weld.toml: 30 more like these: tiefmu info weld.toml --json"
+    assert len(lines) == 12 and "slave 900: offset d = 0.01 m" in lines[11]
+    assert main(["info", name]) == 0
+    said = capsys.readouterr().out
+    assert said.count("lies outside segment 1") == 20
+    assert "\nwarning: 20 more like these (--json lists all)\nwarning: tie 'weld': slave 900: offset" in said
+    assert main(["info", name, "--json"]) == 0
+    assert capsys.readouterr().out.count("lies outside segment 1") == 40
+
+
 def test_info_of_a_scene_and_of_its_fmu_are_the_same(weld, scene_file, capsys):
     name = scene_file(weld)
     assert main(["build", name]) == 0

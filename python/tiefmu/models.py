@@ -9,13 +9,13 @@ from pathlib import Path
 from .arguments import existing, is_fmu
 from .decks import is_deck
 from .package import build
-from .report import report
+from .report import of_each_kind, report
 from .scene import Scene, load
 
 
 def show_warnings(file: str, found: dict) -> None:
     """The warnings of a report, on stderr."""
-    for line in found["warnings"]:
+    for line in of_each_kind(found["warnings"], 10, f": tiefmu info {file} --json"):
         print(f"warning: {file}: {line}", file=sys.stderr)
 
 

@@ -1,7 +1,9 @@
 """The tie report: as a dict (which is also the JSON), and as text."""
 
 import json
+import re
 import zipfile
+from collections import Counter
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +13,7 @@ from .errors import UsageError
 from .scene import MOTIONS, Scene
 
 MOST_PLACES = 10_000  # masters and points whose positions the report holds: an FMU grows by 200 kB at most
+NUMBER = re.compile(r"-?\d[\d.]*(e[+-]?\d+)?")
 MANY_VARIABLES = 10_000  # importers read them in seconds, masters connect them in minutes
 SHOWN = 20  # slaves, masters, points and ids that the text shows; the dict has all
 
@@ -288,7 +291,7 @@ def text(name: str, found: dict) -> str:
     lines += [f"dropped: slave {row['id']} of tie '{row['tie']}': {row['reason']}" for row in found["dropped"][:SHOWN]]
     lines += more(found["dropped"], "dropped slaves")
     for key in ("warnings", "notes"):
-        lines += [f"{key[:-1]}: {line}" for line in found[key][:SHOWN]] + more(found[key], key)
+        lines += [f"{key[:-1]}: {line}" for line in of_each_kind(found[key], SHOWN, " (--json lists all)")]
     return "\n".join(lines) + "\n"
 
 
@@ -364,6 +367,20 @@ def step(seconds: float) -> str:
 
 def more(rows: list, what: str) -> list[str]:
     return [f"  ... and {len(rows) - SHOWN} more {what} (--json lists all)"] if len(rows) > SHOWN else []
+
+
+def of_each_kind(lines: list[str], most: int, where: str) -> list[str]:
+    """The first `most` of the lines that differ in numbers alone, then how many more there are, and `where`."""
+    kinds = [NUMBER.sub("0", line) for line in lines]
+    total, count = Counter(kinds), Counter()
+    shown = []
+    for line, kind in zip(lines, kinds):
+        count[kind] += 1
+        if count[kind] <= most:
+            shown.append(line)
+        elif count[kind] == total[kind]:
+            shown.append(f"{total[kind] - most} more like these{where}")
+    return shown
 
 
 def listed(intro: str, items: list) -> list[str]:
