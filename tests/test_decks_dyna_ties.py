@@ -39,16 +39,18 @@ def faces(made: DynaDeck, tmp_path) -> set:
 
 # kinds of contacts
 
+# rotations handed on to masters, rotations of slaves tied; slaves that are moved onto the surface have no arm
 TRANSLATIONS, OFFSET_MOMENT, ALL = (False, False), (True, False), (True, True)
+MOVED = (True, False)
 
 
 @pytest.mark.parametrize(
     "name, rotations, moved, penalty",
     [
-        ("TIED_NODES_TO_SURFACE", TRANSLATIONS, True, False),
+        ("TIED_NODES_TO_SURFACE", MOVED, True, False),
         ("TIED_NODES_TO_SURFACE_OFFSET", TRANSLATIONS, False, True),
         ("TIED_NODES_TO_SURFACE_CONSTRAINED_OFFSET", OFFSET_MOMENT, False, False),
-        ("TIED_SURFACE_TO_SURFACE", TRANSLATIONS, True, False),
+        ("TIED_SURFACE_TO_SURFACE", MOVED, True, False),
         ("TIED_SURFACE_TO_SURFACE_OFFSET", TRANSLATIONS, False, True),
         ("TIED_SURFACE_TO_SURFACE_CONSTRAINED_OFFSET", OFFSET_MOMENT, False, False),
         ("TIED_SURFACE_TO_SURFACE_FAILURE", TRANSLATIONS, False, True),
@@ -84,7 +86,8 @@ def test_rotations_of_slaves_and_masters(tmp_path):
     for name, master, slave in (
         ("TIED_SHELL_EDGE_TO_SURFACE", "true", "true"),
         ("TIED_NODES_TO_SURFACE_CONSTRAINED_OFFSET", "true", "false"),
-        ("TIED_NODES_TO_SURFACE", "false", "false"),
+        ("TIED_NODES_TO_SURFACE", "true", "false"),
+        ("TIED_NODES_TO_SURFACE_OFFSET", "false", "false"),
     ):
         made = deck(upper).part(4).elements("SHELL", 4, {4: tuple(upper)}).tie(4, 1, (3, 3), name=name)
         columns = read(made, tmp_path).scene.columns
@@ -92,6 +95,14 @@ def test_rotations_of_slaves_and_masters(tmp_path):
         assert (turning[1], turning[31]) == (master, slave), name
         inertia = dict(zip(columns["id"].tolist(), columns["inertia"].tolist()))
         assert (inertia[31] > 0) == (slave == "true")
+
+
+def test_masters_keep_rotations_that_another_tie_needs(tmp_path):
+    made = deck().list_of("NODE", 1, [21]).list_of("NODE", 2, [22])
+    made.tie(1, 1, name="TIED_NODES_TO_SURFACE_OFFSET", title="no moment")
+    found = read(made.tie(2, 1, name="SPOTWELD_CONSTRAINED_OFFSET", number=2, title="weld"), tmp_path)
+    assert [tie.hand_on_rotations for tie in found.deck.ties] == [True, True]
+    assert any("tie 'no moment': the moment of its offset goes to its masters" in w for w in found.deck.warnings)
 
 
 @pytest.mark.parametrize("name", ["AUTOMATIC_SINGLE_SURFACE_TIED", "TIED_SOMETHING", "AUTOMATIC_GENERAL_TIEBREAK"])

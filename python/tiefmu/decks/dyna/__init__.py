@@ -166,6 +166,7 @@ def read_ties(deck: Deck, sets: Sets, tables: Tables, blocks: list[Block], wante
             choice.add(tie, contact.number)
             offsets[tie.name] = kind.offset
     choice.finish()
+    ties.share_masters(deck)
     say_beams(deck)
     return offsets
 

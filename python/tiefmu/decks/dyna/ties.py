@@ -28,6 +28,11 @@ class Kind:
     edge_to_solid: bool = False
     penalty: str = ""
 
+    @property
+    def moved(self) -> bool:
+        """Whether slaves are moved onto the surface."""
+        return not self.offset and not self.penalty
+
 
 def kind_of(name: str) -> Kind | None:
     """Of a contact's name behind CONTACT_ without OPTIONS; None where it is no tie. ValueError: a tie that is not
@@ -136,15 +141,30 @@ def read(deck: Deck, sets: Sets, tables: Tables, contact: Contact, kind: Kind) -
         "box",
         unresolved="drop",
         pairwise=(0.0, CRITERION[1]) if negative else CRITERION,
-        hand_on_rotations=kind.turns or kind.offset in OFFSETS[:2],
+        hand_on_rotations=kind.turns or kind.moved or kind.offset in OFFSETS[:2],  # moved ones have no arm
         slave_rotations=kind.turns,
         slave_thickness=slave_thickness(deck, tables, contact, negative),
-        adjust=not kind.offset and not kind.penalty,
+        adjust=kind.moved,
         onto_middle=True,
         where=block.where,
     )
     say(deck, contact, kind, tie, negative)
     return tie
+
+
+def share_masters(deck: Deck):
+    """Masters keep their rotations for a tie that needs them, also where another one hands no moment on."""
+    turning = np.zeros(len(deck.node_id), bool)
+    for tie in deck.ties:
+        if tie.hand_on_rotations:
+            turning[tie.faces.nodes[tie.faces.nodes >= 0]] = True
+    for tie in deck.ties:
+        if not tie.hand_on_rotations and turning[tie.faces.nodes[tie.faces.nodes >= 0]].any():
+            tie.hand_on_rotations = True
+            deck.warn(
+                f"{tie.where}: tie '{tie.name}': the moment of its offset goes to its masters, as other ties need "
+                "their rotations"
+            )
 
 
 def say(deck: Deck, contact: Contact, kind: Kind, tie: Tie, negative: bool):
@@ -156,10 +176,10 @@ def say(deck: Deck, contact: Contact, kind: Kind, tie: Tie, negative: bool):
     said = []
     if kind.turns:
         said.append("translations and rotations are tied")
-    elif tie.hand_on_rotations:
+    elif tie.hand_on_rotations and not kind.moved:
         said.append("translations are tied, with the moment of the offset; rotations of slaves are free and left out")
     else:
-        said.append("translations alone are tied; rotations are left out")
+        said.append("translations alone are tied; rotations of slaves are left out")
     if kind.edge_to_solid:
         said.append("formulation optimized, as moments go to solids as couples")
     if tie.adjust:
