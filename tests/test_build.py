@@ -184,6 +184,7 @@ REPORT_KEYS = {
     "integrator_limit",
     "freedoms",
     "variables",
+    "interface",
 }
 
 
