@@ -9,6 +9,8 @@
 
 namespace tiefmu {
 
+static_assert(std::size(logCategories) == static_cast<std::size_t>(Category::all) + 1, "one name a category, in order");
+
 void Log::choose(bool switchedOn, std::size_t count, const char* const names[]) {
   unsigned chosen = count == 0 ? ~0u : 0u;
   for (std::size_t i = 0; i < count; ++i) {

@@ -12,7 +12,7 @@ namespace tiefmu {
 namespace {
 
 constexpr std::string_view magic = "tiefmu scene\n";
-constexpr std::uint32_t formatVersion = 3;  // raise it whenever `fields` changes
+constexpr std::uint32_t formatVersion = 3;  // raise it whenever a `field` changes
 constexpr std::size_t headerSize = magic.size() + 4 + 8 + 8;
 
 // FNV-1a, 64 bit: against damage in transport, not against intent.
@@ -62,7 +62,8 @@ class Reader {
   cereal::PortableBinaryInputArchive archive;
 };
 
-// `field` and `fields` list what is stored, once for both directions: with a Writer the values are only read.
+// `field` lists what is stored, once for both directions: with a Writer the values are only read. A structure is taken
+// apart into all its members, so that one that is forgotten here does not compile.
 
 template <class Archive, class T>
   requires std::is_arithmetic_v<T>
@@ -92,31 +93,11 @@ template <class Archive> void field(Archive& a, std::string& text) {
   a.numbers(text.data(), text.size());
 }
 
-template <class Archive> void field(Archive& a, SpringEnd& end) {
-  field(a, end.node);
-  field(a, end.slave);
-  field(a, end.orientation);
-}
-
-template <class Archive> void field(Archive& a, Spring& s) {
-  field(a, s.a);
-  field(a, s.b);
-  field(a, s.kind);
-  for (Vec3* v : {&s.stiffness, &s.damping, &s.rotationalStiffness, &s.rotationalDamping, &s.arm, &s.anchor})
-    field(a, *v);
-  field(a, s.length);
-}
-
-template <class Archive> void field(Archive& a, TieGroup& g);
-
-template <class Archive> void field(Archive& a, Port& p);
-
-template <class Archive> void field(Archive& a, Finding& f) {
-  int kind = f.kind;
-  field(a, kind);
-  f.kind = kind == Finding::warning ? Finding::warning : Finding::note;
-  field(a, f.text);
-}
+template <class Archive> void field(Archive& a, SpringEnd& end);
+template <class Archive> void field(Archive& a, Spring& spring);
+template <class Archive> void field(Archive& a, TieGroup& group);
+template <class Archive> void field(Archive& a, Port& port);
+template <class Archive> void field(Archive& a, Finding& finding);
 
 template <class Archive, class T> void field(Archive& a, std::vector<T>& values) {
   if constexpr (std::is_arithmetic_v<T>) {
@@ -128,25 +109,34 @@ template <class Archive, class T> void field(Archive& a, std::vector<T>& values)
   }
 }
 
-template <class Archive> void field(Archive& a, TieGroup& g) {
-  field(a, g.coupling);
-  field(a, g.corners);
-  field(a, g.firstSlave);
-  field(a, g.node);
-  field(a, g.begin);
-  field(a, g.weight);
-  field(a, g.partEnd);
+template <class Archive> void fields(Archive& a, auto&... values) { (field(a, values), ...); }
+
+template <class Archive> void field(Archive& a, SpringEnd& end) {
+  auto& [node, slave, orientation] = end;
+  fields(a, node, slave, orientation);
 }
 
-template <class Archive> void field(Archive& a, Port& p) {
-  field(a, p.name);
-  field(a, p.number);
-  field(a, p.ofSlaves);
-  field(a, p.member);
-  field(a, p.arm);
-  for (Vec3* v : {&p.place, &p.lever, &p.velocity, &p.spin}) field(a, *v);
-  field(a, p.turnWeight);
-  field(a, p.orientation);
+template <class Archive> void field(Archive& a, Spring& spring) {
+  auto& [end, other, kind, stiffness, damping, rotationalStiffness, rotationalDamping, arm, anchor, length] = spring;
+  fields(a, end, other, kind, stiffness, damping, rotationalStiffness, rotationalDamping, arm, anchor, length);
+}
+
+template <class Archive> void field(Archive& a, TieGroup& group) {
+  auto& [coupling, corners, firstSlave, node, begin, weight, partEnd] = group;
+  fields(a, coupling, corners, firstSlave, node, begin, weight, partEnd);
+}
+
+template <class Archive> void field(Archive& a, Port& port) {
+  auto& [name, number, ofSlaves, member, arm, place, lever, velocity, spin, turnWeight, orientation] = port;
+  fields(a, name, number, ofSlaves, member, arm, place, lever, velocity, spin, turnWeight, orientation);
+}
+
+template <class Archive> void field(Archive& a, Finding& finding) {
+  auto& [kind, text] = finding;
+  int number = kind;
+  field(a, number);
+  kind = number == Finding::warning ? Finding::warning : Finding::note;
+  field(a, text);
 }
 
 template <class Archive> void field(Archive& a, Settings& s) {
@@ -154,25 +144,17 @@ template <class Archive> void field(Archive& a, Settings& s) {
 }
 
 // Everything of a model but its tie report: an instance computes with all of it and shows none of that.
-template <class Archive> void field(Archive& a, Model& m) {
-  field(a, m.settings);
-  for (int& begin : m.begin) field(a, begin);
-  field(a, m.nodeId);
-  field(a, m.nodeNumber);
-  for (auto* v : {&m.nodePosition, &m.nodeVelocity, &m.nodeSpin, &m.nodeMass, &m.nodeInertia, &m.nodeStiffness,
-                  &m.nodeRotationalStiffness})
-    field(a, *v);
-  field(a, m.slaveId);
-  field(a, m.slaveNumber);
-  for (auto* v : {&m.slaveOffset, &m.slaveMass, &m.slaveInertia, &m.slaveStiffness, &m.slaveRotationalStiffness})
-    field(a, *v);
-  field(a, m.turningSlaves);
-  field(a, m.groups);
-  field(a, m.springs);
-  field(a, m.oriented);
-  field(a, m.ports);
-  field(a, m.tieName);
-  field(a, m.findings);
+template <class Archive> void field(Archive& a, Model& model) {
+  auto& [settings, begin, nodeId, nodeNumber, nodePosition, nodeVelocity, nodeSpin, nodeMass, nodeInertia,
+         nodeStiffness, nodeRotationalStiffness, slaveId, slaveNumber, slaveOffset, slaveMass, slaveInertia,
+         slaveStiffness, slaveRotationalStiffness, turningSlaves, groups, springs, oriented, ports, tieName,
+         searchDistance, slaveReport, findings, dropped, leftOut] = model;
+  field(a, settings);
+  for (int& first : begin) field(a, first);
+  fields(a, nodeId, nodeNumber, nodePosition, nodeVelocity, nodeSpin, nodeMass, nodeInertia, nodeStiffness,
+         nodeRotationalStiffness);
+  fields(a, slaveId, slaveNumber, slaveOffset, slaveMass, slaveInertia, slaveStiffness, slaveRotationalStiffness);
+  fields(a, turningSlaves, groups, springs, oriented, ports, tieName, findings);
 }
 
 void require(bool truth, const char* what) {
@@ -194,10 +176,11 @@ template <class E> void requireEnum(E value, const char* what) {
 void checkSettings(const Settings& s) {
   const auto check = [&]<class T>(const SettingsMember<T>& m) {
     if constexpr (std::is_enum_v<T>) requireEnum(s.*m.member, m.key);
+    if constexpr (std::is_same_v<T, double>) require(std::isfinite(s.*m.member), m.key);
+    if constexpr (std::is_same_v<T, Vec3>) require((s.*m.member).allFinite(), m.key);
   };
   std::apply([&](const auto&... m) { (check(m), ...); }, settingsMembers);
   require(s.threads >= 0 && s.threads <= mostThreads, "threads");
-  require(s.gravity.allFinite() && std::isfinite(s.timeStep) && std::isfinite(s.safety), "settings");
 }
 
 void checkNodes(const Model& m) {
@@ -250,10 +233,10 @@ void checkGroups(const Model& m) {
     require(!g.partEnd.empty() && std::is_sorted(g.partEnd.begin(), g.partEnd.end()) && g.partEnd.front() >= 0 &&
                 g.partEnd.back() <= g.segments(),
             "parts");
-    const int nodes = g.coupling == Coupling::rotation ? m.rotating() : m.nodes();
+    const int nodes = kinematicsOf(g.coupling).mastersTurn ? m.rotating() : m.nodes();
     for (int node : g.node) require(node >= 0 && node < nodes, "corners of segments");
     next += slaves;
-    const bool turns = g.coupling != Coupling::translation;
+    const bool turns = kinematicsOf(g.coupling).slavesTurn;
     require(slaves == 0 || turns == (next <= static_cast<std::size_t>(m.turningSlaves)), "turning slaves");
   }
   require(next == m.slaveId.size(), "slave groups");
@@ -263,7 +246,7 @@ void checkGroups(const Model& m) {
 std::size_t rotations(const Model& m) {
   std::size_t count = m.oriented.size();
   for (const TieGroup& g : m.groups)
-    if (g.coupling == Coupling::meanMotion) count += g.begin.size() - 1;
+    if (kinematicsOf(g.coupling).segmentsTurn) count += g.begin.size() - 1;
   return count;
 }
 

@@ -95,7 +95,7 @@ Segment Influences::segment(const TieGroup& g, int e) const {
   Mat3 ibar = Mat3::Zero();
   for (int i = 0; i < g.corners; ++i) {
     s.arm[i] = at(model.nodePosition.data(), s.node[i]) - centre;
-    ibar += s.arm[i].squaredNorm() * Mat3::Identity() - s.arm[i] * s.arm[i].transpose();
+    ibar += unitInertia(s.arm[i]);
   }
   s.inverse = ibar.inverse();
   return s;
@@ -108,27 +108,31 @@ void Influences::corners(const Segment& s, int slave, CornerMap maps[4]) const {
     const bool mean = s.group.coupling == Coupling::meanMotion;
     for (int i = 0; i < s.group.corners; ++i)
       r += (mean ? 1.0 / s.group.corners : weight(s, slave, i)) * at(model.nodePosition.data(), s.node[i]);
-    const bool turns = s.group.coupling != Coupling::translation;
+    const bool turns = kinematicsOf(s.group.coupling).slavesTurn;
     if (turns) r += d;
     maps[0] = {identityPattern, turning(r), {}, turns ? identityPattern : Pattern{}};
     return;
   }
   for (int i = 0; i < s.group.corners; ++i) {
     CornerMap map;
-    if (s.group.coupling == Coupling::meanMotion) {
-      map.wv = model.finite() ? moving(fullPattern) : patternOf(s.inverse * skew(s.arm[i]));
-      if (!hasOffset(slave))
-        map.vv = identityPattern;
-      else if (model.finite())
-        map.vv = moving(fullPattern);
-      else
-        map.vv = patternOf(Mat3::Identity() / s.group.corners - skew(d) * s.inverse * skew(s.arm[i]));
-    } else if (weight(s, slave, i) != 0) {
-      map.vv = identityPattern;
-      if (s.group.coupling == Coupling::rotation) {
-        map.ww = identityPattern;
+    switch (s.group.coupling) {
+      case Coupling::meanMotion:
+        map.wv = model.finite() ? moving(fullPattern) : patternOf(s.inverse * skew(s.arm[i]));
+        if (!hasOffset(slave))
+          map.vv = identityPattern;
+        else if (model.finite())
+          map.vv = moving(fullPattern);
+        else
+          map.vv = patternOf(Mat3::Identity() / s.group.corners - skew(d) * s.inverse * skew(s.arm[i]));
+        break;
+      case Coupling::rotation:
+        if (weight(s, slave, i) == 0) break;
+        map.vv = map.ww = identityPattern;
         if (hasOffset(slave)) map.vw = model.finite() ? moving(crossPattern) : patternOf(-skew(d));
-      }
+        break;
+      case Coupling::translation:
+        if (weight(s, slave, i) != 0) map.vv = identityPattern;
+        break;
     }
     maps[i] = map;
   }
@@ -162,15 +166,19 @@ Influences::Bias Influences::bias(const Segment& s, int slave, int corner) const
   Bias b;
   if (!model.finite()) return b;
   if (s.body[0] >= model.nodes()) {
-    if (model.accelerationInputs() || (s.group.coupling != Coupling::translation && hasOffset(slave)))
+    if (model.accelerationInputs() || (kinematicsOf(s.group.coupling).slavesTurn && hasOffset(slave)))
       b.onW = moving(fullPattern);
     return b;
   }
-  if (s.group.coupling == Coupling::meanMotion) {
-    if (hasOffset(slave)) b.onV = moving(fullPattern);
-    b.onZ = moving(fullPattern);
-  } else if (s.group.coupling == Coupling::rotation && hasOffset(slave) && weight(s, slave, corner) != 0) {
-    b.onW = moving(fullPattern);
+  switch (s.group.coupling) {
+    case Coupling::meanMotion:
+      if (hasOffset(slave)) b.onV = moving(fullPattern);
+      b.onZ = moving(fullPattern);
+      break;
+    case Coupling::rotation:
+      if (hasOffset(slave) && weight(s, slave, corner) != 0) b.onW = moving(fullPattern);
+      break;
+    case Coupling::translation: break;
   }
   return b;
 }

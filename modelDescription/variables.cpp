@@ -39,7 +39,7 @@ class Blocks {
     for (const Port& port : model.ports)
       for (int k : port.member) (port.ofSlaves ? slaveInPort : nodeInPort)[static_cast<std::size_t>(k)] = 1;
     for (const TieGroup& g : model.groups)
-      if (g.coupling == Coupling::rotation)
+      if (kinematicsOf(g.coupling).mastersTurn)
         for (int node : g.node) withoutMoment[static_cast<std::size_t>(node)] = 0;
     for (int node = 0; node < model.nodes(); ++node)
       withoutMoment[static_cast<std::size_t>(node)] |= nodeInPort[static_cast<std::size_t>(node)];

@@ -15,7 +15,7 @@ struct LogCategory {
   const char* description;
 };
 
-// What the instance logs under, in the order of fmu/instance.hpp's enumeration.
+// What the instance logs under, in the order of Category (fmu/log.hpp).
 inline constexpr LogCategory logCategories[] = {
     {"logStatusError", "Errors; they are logged also while logging is off"},
     {"logStatusWarning", "Warnings"},

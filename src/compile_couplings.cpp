@@ -123,7 +123,7 @@ void Compilation::resolveRotations() {
   turns = scene.nodes.rotations;
   std::vector<std::uint8_t> used(turns.size(), 0);
   for (const Bond& b : bonds)
-    if (b.coupling == Coupling::rotation)
+    if (kinematicsOf(b.coupling).mastersTurn)
       for (int i = 0; i < b.corners; ++i) used[scene.segments.nodes[b.segment][i]] = 1;
   for (const SceneSpring& s : scene.springs)
     if (s.kind == SpringKind::bushing) {

@@ -83,15 +83,15 @@ void Compilation::placeSlaves() {
       lastSegment = b.segment;
       for (int i = 0; i < b.corners; ++i) group.node.push_back(nodeIndex[scene.segments.nodes[b.segment][i]]);
       group.begin.push_back(group.begin.back());
-      if (b.coupling == Coupling::meanMotion) ++meanMotionSegments;
+      if (kinematicsOf(b.coupling).segmentsTurn) ++meanMotionSegments;
     }
     ++group.begin.back();
-    segmentRotation.push_back(b.coupling == Coupling::meanMotion ? meanMotionSegments - 1 : -1);
+    segmentRotation.push_back(kinematicsOf(b.coupling).segmentsTurn ? meanMotionSegments - 1 : -1);
     group.weight.insert(group.weight.end(), b.projection.phi.begin(), b.projection.phi.begin() + b.corners);
 
     const int node = b.slave;
     slaveIndex[node] = s;
-    if (b.coupling != Coupling::translation) model.turningSlaves = s + 1;
+    if (kinematicsOf(b.coupling).slavesTurn) model.turningSlaves = s + 1;
     model.slaveId.push_back(scene.nodes.id[node]);
     model.slaveNumber.push_back(number[s]);
     model.slaveOffset.insert(model.slaveOffset.end(), b.offset.begin(), b.offset.end());

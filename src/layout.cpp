@@ -12,14 +12,14 @@ bool anySpring(const Model& model, auto predicate) {
 std::size_t frames(const Model& model) {
   std::size_t count = 0;
   for (const TieGroup& group : model.groups)
-    if (group.coupling == Coupling::meanMotion) count += static_cast<std::size_t>(group.segments());
+    if (kinematicsOf(group.coupling).segmentsTurn) count += static_cast<std::size_t>(group.segments());
   return count;
 }
 
 bool framesTurn(const Model& model) {
   bool offsets = false;
   for (const TieGroup& group : model.groups)
-    if (group.coupling == Coupling::meanMotion)
+    if (kinematicsOf(group.coupling).segmentsTurn)
       for (int k = 3 * group.firstSlave; k < 3 * (group.firstSlave + group.slaves()); ++k)
         offsets |= model.slaveOffset[k] != 0;
   const auto ofFrame = [last = static_cast<int>(frames(model))](const SpringEnd& end) {
@@ -41,7 +41,7 @@ bool isPresent(const FieldRow& row, const Model& model) {
     case When::anglesAdd:
       return !model.finite() && model.needsPositions() &&
              std::any_of(model.groups.begin(), model.groups.end(),
-                         [](const TieGroup& group) { return group.coupling == Coupling::rotation; });
+                         [](const TieGroup& group) { return kinematicsOf(group.coupling).mastersTurn; });
     case When::finite: return model.finite();
     case When::damped:
       return model.anyFree() && anySpring(model, [](const Spring& spring) {

@@ -30,7 +30,7 @@ bool Model::needsPositions() const {
   for (const Port& port : ports)
     if (port.ofSlaves && port.member.size() > 1) return true;
   return std::any_of(groups.begin(), groups.end(),
-                     [](const TieGroup& g) { return g.coupling == Coupling::meanMotion; });
+                     [](const TieGroup& g) { return kinematicsOf(g.coupling).segmentsTurn; });
 }
 
 }  // namespace tiefmu

@@ -14,6 +14,21 @@ namespace tiefmu {
 
 template <> inline constexpr auto words<Coupling> = std::array{"rotation", "mean-motion", "translation"};
 
+// What a coupling needs and gives.
+struct Kinematics {
+  bool slavesTurn;    // slaves have a rotation and take moments
+  bool mastersTurn;   // the masters' rotations move the slaves, so masters get moments
+  bool segmentsTurn;  // each segment has a SegmentFrame, and its own rotation
+};
+constexpr Kinematics kinematicsOf(Coupling coupling) {
+  switch (coupling) {
+    case Coupling::rotation: return {.slavesTurn = true, .mastersTurn = true, .segmentsTurn = false};
+    case Coupling::meanMotion: return {.slavesTurn = true, .mastersTurn = false, .segmentsTurn = true};
+    case Coupling::translation: return {.slavesTurn = false, .mastersTurn = false, .segmentsTurn = false};
+  }
+  return {};
+}
+
 // Independent nodes (masters and points) are sorted into these groups, by ascending id inside each (along a curve where
 // ids are scattered: localOrder). Rotating nodes come first and free ones stand together, so that every array below is
 // a contiguous slice of its field: rotating = [0, begin[freeMaster]), free = [begin[rotatingFreeMaster],

@@ -72,7 +72,7 @@ NodeInertia nodeInertia(int n, const Vec3* corner) {
   result.ibar.setZero();
   for (int i = 0; i < n; ++i) {
     const Vec3 r = corner[i] - result.centre;
-    result.ibar += r.squaredNorm() * Mat3::Identity() - r * r.transpose();
+    result.ibar += unitInertia(r);
   }
   const Vec3 eigenvalues = Eigen::SelfAdjointEigenSolver<Mat3>(result.ibar, Eigen::EigenvaluesOnly).eigenvalues();
   const double smallest = eigenvalues(0), largest = eigenvalues(2);

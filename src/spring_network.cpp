@@ -8,7 +8,7 @@ namespace tiefmu {
 SpringNetwork::SpringNetwork(const Model& model, const Layout& layout, double* data, AttachedSlaves& slaves)
     : model_(model), layout_(layout), data_(data), slaves_(slaves) {
   for (const TieGroup& group : model.groups)
-    if (group.coupling == Coupling::meanMotion) segmentRotations_ += group.segments();
+    if (kinematicsOf(group.coupling).segmentsTurn) segmentRotations_ += group.segments();
   if (empty()) return;
   slaveForce_.resize(3 * static_cast<std::size_t>(model.slaves()));
   slaveMoment_.resize(3 * static_cast<std::size_t>(model.turning()));

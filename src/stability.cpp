@@ -65,15 +65,19 @@ bool rk4Stable(double h, double omega, double c) {
 
 double stableStep(Method method, double omega, double c) {
   if (!(omega > 0) && !(c > 0)) return none;
-  if (method == Method::centralDifference || method == Method::symplecticEuler)
-    return 4 / (c + std::sqrt(c * c + 4 * omega * omega));  // = 2/omega (sqrt(1 + z^2) - z), also for omega = 0
+  bool (*isStable)(double, double, double) = nullptr;
+  switch (method) {
+    case Method::centralDifference:
+    case Method::symplecticEuler:
+      return 4 / (c + std::sqrt(c * c + 4 * omega * omega));  // = 2/omega (sqrt(1 + z^2) - z), also for omega = 0
+    case Method::nohBathe: isStable = nohBatheStable; break;
+    case Method::rk4: isStable = rk4Stable; break;
+  }
   // Without units: in s and m/s^2 the entries of a step's matrix are many decades apart, and its eigenvalues are lost.
   const double scale = 1 / std::max(omega, c);
   omega *= scale;
   c *= scale;
-  const auto stable = [&](double h) {
-    return method == Method::rk4 ? rk4Stable(h, omega, c) : nohBatheStable(h, omega, c);
-  };
+  const auto stable = [&](double h) { return isStable(h, omega, c); };
   double low = 0, high = 8;
   for (double h = 0.02; h < high; h += 0.02) {
     if (!stable(h)) {

@@ -8,18 +8,18 @@ namespace tiefmu {
 StepBackup::StepBackup(Dynamics& dynamics) : d_(dynamics) {
   const Model& model = d_.model;
   const Layout& layout = d_.layout;
-  const auto any = [&](Coupling coupling) {
+  const auto any = [&](auto has) {
     return std::any_of(model.groups.begin(), model.groups.end(),
-                       [&](const TieGroup& g) { return g.coupling == coupling; });
+                       [&](const TieGroup& g) { return has(kinematicsOf(g.coupling)); });
   };
-  const bool offsets = any(Coupling::rotation);
+  const bool offsets = any([](Kinematics k) { return k.slavesTurn && !k.segmentsTurn; });
   if (model.anyFree()) {
     static_assert(allAre(Field::velocity, Field::position, Role::motion));
     static_assert(adjacent(Field::position, Field::offset) && adjacent(Field::offset, Field::segmentRotation));
     static_assert(allAre(Field::offset, Field::integratorLimit, Role::state));
     kept_ = {layout.through(Field::velocity, Field::position),
              layout.through(offsets ? Field::offset : Field::segmentRotation, Field::integratorLimit)};
-  } else if (any(Coupling::meanMotion) && model.finite()) {
+  } else if (any([](Kinematics k) { return k.segmentsTurn; }) && model.finite()) {
     // An all-driven scene loses what it cannot compute anew only where a segment collapses.
     static_assert(allAre(Field::segmentRotation, Field::work, Role::state));
     kept_ = {layout.through(Field::position, offsets ? Field::offset : Field::position),

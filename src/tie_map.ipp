@@ -69,12 +69,11 @@ void mapMotion(const TieView& tie, TieGeometry geometry, const double* u, const 
                double* turns) {
   byCorners(tie, [&](auto n) TIEFMU_INLINED {
     constexpr int N = decltype(n)::value;
-    if (tie.coupling == Coupling::translation)
-      mapTranslation<N>(tie, u, us);
-    else if (tie.coupling == Coupling::rotation)
-      mapRotation<N>(tie, geometry.offset, u, turn, us, turns);
-    else
-      mapMeanMotion<N>(tie, geometry, u, us, turns);
+    switch (tie.coupling) {
+      case Coupling::rotation: return mapRotation<N>(tie, geometry.offset, u, turn, us, turns);
+      case Coupling::meanMotion: return mapMeanMotion<N>(tie, geometry, u, us, turns);
+      case Coupling::translation: return mapTranslation<N>(tie, u, us);
+    }
   });
 }
 
@@ -157,12 +156,11 @@ void distributeLoads(const TieView& tie, TieGeometry geometry, const double* for
                      double* t) {
   byCorners(tie, [&](auto n) TIEFMU_INLINED {
     constexpr int N = decltype(n)::value;
-    if (tie.coupling == Coupling::translation)
-      distributeTranslation<N>(tie, force, f);
-    else if (tie.coupling == Coupling::rotation)
-      distributeRotation<N>(tie, geometry.offset, force, moment, f, t);
-    else
-      distributeMeanMotion<N>(tie, geometry, force, moment, f);
+    switch (tie.coupling) {
+      case Coupling::rotation: return distributeRotation<N>(tie, geometry.offset, force, moment, f, t);
+      case Coupling::meanMotion: return distributeMeanMotion<N>(tie, geometry, force, moment, f);
+      case Coupling::translation: return distributeTranslation<N>(tie, force, f);
+    }
   });
 }
 
@@ -207,8 +205,11 @@ void addBias(const TieView& tie, TieGeometry geometry, const double* velocity, c
              double* zs) {
   byCorners(tie, [&](auto n) TIEFMU_INLINED {
     constexpr int N = decltype(n)::value;
-    if (tie.coupling == Coupling::rotation) biasRotation<N>(tie, geometry.offset, spin, as);
-    if (tie.coupling == Coupling::meanMotion) biasMeanMotion<N>(tie, geometry, velocity, as, zs);
+    switch (tie.coupling) {
+      case Coupling::rotation: return biasRotation<N>(tie, geometry.offset, spin, as);
+      case Coupling::meanMotion: return biasMeanMotion<N>(tie, geometry, velocity, as, zs);
+      case Coupling::translation: return;
+    }
   });
 }
 

@@ -11,7 +11,7 @@ Ties::Ties(const Model& model, const Layout& layout, double* data) : model_(mode
   const std::size_t s = model.slaves(), u = model.turning();
   for (const TieGroup& group : model.groups) {
     firstFrame_.push_back(frames_.size());
-    if (group.coupling == Coupling::meanMotion) frames_.resize(frames_.size() + group.segments());
+    if (kinematicsOf(group.coupling).segmentsTurn) frames_.resize(frames_.size() + group.segments());
   }
   inverseLength2_.resize(u);
   for (std::size_t j = 0; j < u; ++j) {
@@ -46,7 +46,7 @@ void Ties::startThreads() {
 
 TieGeometry Ties::geometry(std::size_t g) const {
   // Offsets of translation couplings never turn, so they have no place in the state.
-  const bool turning = model_.groups[g].coupling != Coupling::translation;
+  const bool turning = kinematicsOf(model_.groups[g].coupling).slavesTurn;
   return {turning ? field(Field::offset) : model_.slaveOffset.data(), frames_.data() + firstFrame_[g]};
 }
 

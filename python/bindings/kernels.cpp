@@ -249,7 +249,7 @@ void bindKernels(nb::module_& parent) {
             for (int k = 1; k <= nodeGroups; ++k) model.begin[k] = static_cast<int>(g.nodes);
             model.groups.push_back(g.tie);
             model.slaveId.resize(g.slaves);
-            model.turningSlaves = g.tie.coupling == Coupling::translation ? 0 : static_cast<int>(g.slaves);
+            model.turningSlaves = kinematicsOf(g.tie.coupling).slavesTurn ? static_cast<int>(g.slaves) : 0;
             model.slaveOffset = g.offset;
             model.nodePosition.assign(positions.data(), positions.data() + positions.size());
             std::vector<double> added(g.nodes), addedInertia(g.nodes);

@@ -84,6 +84,8 @@ class NamedSimulation {
       d["ids"] = numpy(b.ids);
       d["labels"] = b.labels;
       d["reference"] = b.reference;
+      d["field"] = rowOf(b.field).name;
+      d["computed"] = rowOf(b.field).role == Role::output;
       result.append(d);
     }
     return result;
