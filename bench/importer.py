@@ -12,9 +12,9 @@ from pathlib import Path
 import fmpy
 import numpy as np
 import tiefmu
+from tiefmu.fmu_instance import Fmu, Instance, moving_pointer, references
 from tiefmu.run import experiment, simulate
 from tiefmu.signals import read_inputs
-from tiefmu.slave import Fmu, Slave, moving_pointer, references
 
 SCENES = Path(__file__).resolve().parents[1] / "scenes"
 REPEATS = 15
@@ -22,9 +22,9 @@ STEPS = 2000
 
 
 def bare(fmu, plan, outputs) -> float:
-    slave = Slave(fmu, outputs)
-    instance = slave.instance
-    slave._initialise(plan, {})
+    loaded = Instance(fmu, outputs)
+    instance = loaded.instance
+    loaded._initialise(plan, {})
     rows = np.empty((STEPS + 1, len(outputs)))
     given = plan.inputs.at(plan.start + plan.step * np.arange(STEPS))
     n, m = len(outputs), len(plan.inputs.references)
@@ -33,23 +33,23 @@ def bare(fmu, plan, outputs) -> float:
     row_at.value, control_at.value = rows.ctypes.data, given.ctypes.data
     controls = references(plan.inputs.references)
     began = time.perf_counter()
-    instance.fmi2GetReal(instance.component, slave.references, n, row)
+    instance.fmi2GetReal(instance.component, loaded.references, n, row)
     for k in range(STEPS):
         instance.fmi2SetReal(instance.component, controls, m, control)
         instance.fmi2DoStep(instance.component, plan.start + k * plan.step, plan.step, 1)
         row_at.value += 8 * n
         control_at.value += 8 * m
-        instance.fmi2GetReal(instance.component, slave.references, n, row)
+        instance.fmi2GetReal(instance.component, loaded.references, n, row)
     seconds = time.perf_counter() - began
     instance.terminate()
-    slave.free()
+    loaded.free()
     return seconds
 
 
 def own(fmu, plan, outputs) -> float:
-    slave = Slave(fmu, outputs)
-    seconds = simulate(slave, plan, outputs).seconds
-    slave.free()
+    loaded = Instance(fmu, outputs)
+    seconds = simulate(loaded, plan, outputs).seconds
+    loaded.free()
     return seconds
 
 

@@ -18,7 +18,7 @@ from tiefmu.acceptance.criteria import TABLES, read
 from tiefmu.acceptance.judge import Judge
 from tiefmu.acceptance.quantities import coefficients, filtered
 from tiefmu.cli import main
-from tiefmu.slave import Fmu, Slave
+from tiefmu.fmu_instance import Fmu, Instance
 
 EXAMPLE = Path(__file__).resolve().parents[1] / "examples" / "acceptance"
 END, STEP = 0.02, 1e-4
@@ -72,9 +72,9 @@ def verdicts(folder, text) -> dict:
     path.write_text(f'[run]\ninput = "in.csv"\nstep = {STEP!r}\n{text}')
     with Fmu(folder / "plate.fmu") as fmu:
         judge = Judge(fmu, read(path), folder, str(path))
-        slave = Slave(fmu, judge.outputs)
-        found = judge.judge(slave, judge.plan(None, None, None)).verdicts
-        slave.free()
+        instance = Instance(fmu, judge.outputs)
+        found = judge.judge(instance, judge.plan(None, None, None)).verdicts
+        instance.free()
     return {verdict.name: verdict for verdict in found}
 
 

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from tiefmu import SceneError, load
 from tiefmu.mesh import arrays
 from tiefmu.report import report
-from tiefmu.scene import SceneError, load
 
 GOOD = {
     "node_id": np.array([1, 2, 3, 4, 7, 101]),

@@ -9,12 +9,12 @@ import numpy as np
 import pyarrow.parquet
 import pytest
 import tiefmu
-from tiefmu import key_figures, results, slave
+from tiefmu import fmu_instance, key_figures, results
 from tiefmu.cli import main
+from tiefmu.fmu_instance import Fmu, Instance
 from tiefmu.report import of_fmu
 from tiefmu.run import experiment, run, simulate
 from tiefmu.signals import Inputs, communication_points, read_inputs
-from tiefmu.slave import Fmu, Slave
 
 CSV = {
     "linear": "time,slave[1].f[3],master[1].v[3],master[2].v[1]\n0,0,1,0.3\n0.3,100,1,-0.7\n1,3,2,0\n",
@@ -109,13 +109,13 @@ def test_points_of_a_slave_that_takes_one_step_only():
 def test_blocks_of_any_size_hold_the_same_rows(fmu, tmp_path, monkeypatch):
     path = tmp_path / "in.csv"
     path.write_text(CSV["jumps"])
-    monkeypatch.setattr(slave, "INPUTS_AHEAD", 50)
+    monkeypatch.setattr(fmu_instance, "INPUTS_AHEAD", 50)
     with Fmu(fmu) as unpacked:
         plan = experiment(unpacked, None, 0.03, path)
         names = unpacked.outputs()
         found = []
         for largest in (1, 3 * 8 * (1 + len(names)), 2**20):
-            instance = Slave(unpacked, names)
+            instance = Instance(unpacked, names)
             found.append(np.concatenate(list(instance.blocks(plan, largest=largest))))
             instance.free()
     assert len(found[0]) > 30
@@ -128,7 +128,7 @@ def test_an_instance_that_is_reset_answers_the_same(fmu, tmp_path):
     with Fmu(fmu) as unpacked:
         plan = experiment(unpacked, None, 0.1, path)
         names = unpacked.outputs()
-        instance = Slave(unpacked, names)
+        instance = Instance(unpacked, names)
         first = simulate(instance, plan, names)
         instance.reset()
         second = simulate(instance, plan, names)
@@ -140,7 +140,7 @@ def test_start_values_hold_without_inputs(fmu):
     with Fmu(fmu) as unpacked:
         plan = experiment(unpacked, 0.1, 0.05, None)
         names = unpacked.outputs()
-        instance = Slave(unpacked, names)
+        instance = Instance(unpacked, names)
         found = simulate(instance, plan, names, start_values={"slave[1].f[3]": 10.0})
         instance.free()
     assert sum(found[f"master[{i}].f[3]"][-1] for i in range(1, 5)) == pytest.approx(10.0, rel=1e-12)
@@ -149,7 +149,7 @@ def test_start_values_hold_without_inputs(fmu):
 def test_every_format_holds_the_same_numbers(fmu, tmp_path, monkeypatch):
     path = tmp_path / "in.csv"
     path.write_text(CSV["jumps"])
-    monkeypatch.setattr(slave, "LARGEST_BLOCK", 4096)
+    monkeypatch.setattr(fmu_instance, "LARGEST_BLOCK", 4096)
     tables = []
     for ending in ("csv", "parquet", "h5"):
         result, _ = run(fmu, None, 0.03, path, output=tmp_path / f"out.{ending}")
@@ -173,7 +173,7 @@ def test_a_run_that_does_not_fit_keeps_every_kth_row(fmu, tmp_path, monkeypatch)
     path.write_text(CSV["linear"])
     whole, _ = run(fmu, None, 0.01, path)
     monkeypatch.setattr(results, "MOST_KEPT", whole.rows.nbytes // 7)
-    monkeypatch.setattr(slave, "LARGEST_BLOCK", 5000)
+    monkeypatch.setattr(fmu_instance, "LARGEST_BLOCK", 5000)
     thinned, _ = run(fmu, None, 0.01, path, output=tmp_path / "out.csv")
     assert thinned.every >= 7
     np.testing.assert_array_equal(thinned.rows, np.vstack([whole.rows[:: thinned.every], whole.rows[-1]]))
@@ -223,7 +223,7 @@ def test_nothing_is_left_of_a_run_that_stops(fmu, tmp_path, capsys):
 def test_no_object_is_made_in_a_step():
     """The pointer into the rows moves in place."""
     rows = np.arange(6.0).reshape(3, 2)
-    pointer, address = slave.moving_pointer()
+    pointer, address = fmu_instance.moving_pointer()
     address.value = rows.ctypes.data
     assert pointer[0] == 0.0
     address.value += ctypes.sizeof(ctypes.c_double) * 2

@@ -13,9 +13,10 @@ from importlib.metadata import version
 
 from ._core import Simulation
 from .errors import Diverged, RunError, SceneError, StepTooLong, UsageError
+from .loading import load
 from .package import build
 from .report import report
-from .scene import Scene, load
+from .scene import Scene
 
 __version__ = version("tiefmu")
 __all__ = [

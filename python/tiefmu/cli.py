@@ -13,6 +13,7 @@ from .binaries import libraries, stale
 from .decks import command as import_command
 from .demo import SCENES, demo
 from .errors import RunError, SceneError, UsageError
+from .loading import load
 from .models import fmu_of, show_warnings
 from .package import build
 from .platforms import BY_FOLDER
@@ -20,7 +21,6 @@ from .plot import check_picture, plot
 from .report import counted, of_fmu, report, summary, text
 from .results import check_format
 from .run import run
-from .scene import load
 from .sweep import command as sweep_command
 from .view import page as report_command
 from .view.vtk import FIELDS, FRAMES, NODE_FIELDS, write_ties

@@ -10,12 +10,12 @@ import numpy as np
 from .decks import is_deck
 from .errors import UsageError
 from .key_figures import energy_scale, part
+from .loading import load
 from .package import build
 from .plot import plot
 from .report import report
 from .results import Result
 from .run import run
-from .scene import load
 
 SCENES = Path(__file__).resolve().parents[2] / "scenes"  # of the checkout
 

@@ -1,4 +1,4 @@
-"""An FMU on FMPy's FMU2Slave: one call for all inputs, one step, one call for all outputs, on preallocated arrays."""
+"""FMUs and their instances on FMPy's FMU2Slave: a step is three calls, on preallocated arrays."""
 
 import contextlib
 import ctypes
@@ -109,7 +109,7 @@ def check_library(folder: Path, identifier: str, name: str) -> None:
         wanted[1].write_bytes(path.read_bytes())
 
 
-class Slave:
+class Instance:
     """An instance. Outputs: names of Real variables."""
 
     def __init__(self, fmu: Fmu, outputs: list[str]):
@@ -167,8 +167,8 @@ class Slave:
         width = 8 * (1 + len(self.references))
         block = np.empty((max(2, min(estimate, largest // width)), 1 + len(self.references)))
         given = np.empty((0, 0))
-        slave, component = self.instance, self.instance.component
-        set_real, do_step, get_real = slave.fmi2SetReal, slave.fmi2DoStep, slave.fmi2GetReal
+        instance, component = self.instance, self.instance.component
+        set_real, do_step, get_real = instance.fmi2SetReal, instance.fmi2DoStep, instance.fmi2GetReal
         outputs, n_outputs = self.references, len(self.references)
         controls, n_controls = references(inputs.references), len(inputs.references)
         value, value_at = moving_pointer()
@@ -211,22 +211,22 @@ class Slave:
         if row:
             yield block[:row]
         with self._errors("cannot be terminated"):
-            slave.terminate()
+            instance.terminate()
 
     def _initialise(self, plan: Experiment, start_values: dict[str, float]) -> None:
         """As `simulate_fmu` does it: start values, then inputs, in initialization mode."""
-        slave = self.instance
-        slave.setupExperiment(
+        instance = self.instance
+        instance.setupExperiment(
             tolerance=self.fmu.experiment("tolerance", None), startTime=plan.start, stopTime=plan.stop
         )
-        slave.enterInitializationMode()
+        instance.enterInitializationMode()
         if start_values:
-            slave.setReal(
+            instance.setReal(
                 [self.fmu.variables[name].valueReference for name in start_values], list(start_values.values())
             )
         if plan.inputs.references:
-            slave.setReal(plan.inputs.references, plan.inputs.at(np.array([plan.start]), after_jump=False)[0])
-        slave.exitInitializationMode()
+            instance.setReal(plan.inputs.references, plan.inputs.at(np.array([plan.start]), after_jump=False)[0])
+        instance.exitInitializationMode()
 
 
 def references(values: list[int]) -> Any:

@@ -5,9 +5,9 @@ import re
 
 import numpy as np
 
+from .fmu_instance import Fmu
 from .report import of_folder
 from .results import Result
-from .slave import Fmu
 
 REACTION = re.compile(r"((?:master|port)\[.*\]\.f)\[1\]")
 

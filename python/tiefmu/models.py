@@ -8,9 +8,10 @@ from pathlib import Path
 
 from .arguments import existing, is_fmu
 from .decks import is_deck
+from .loading import load
 from .package import build
 from .report import of_each_kind, report
-from .scene import Scene, load
+from .scene import Scene
 
 
 def show_warnings(file: str, found: dict) -> None:

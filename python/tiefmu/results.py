@@ -1,6 +1,7 @@
 """What a run leaves: rows in memory as far as they fit, extremes, and files that are written while it goes on."""
 
 import contextlib
+import importlib.util
 import os
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -163,8 +164,6 @@ def check_format(path: Path) -> None:
 
 def needed(module: str, extra: str | None, what) -> None:
     """Raises UsageError where an optional package is missing: names it and the extra that brings it."""
-    import importlib.util
-
     if importlib.util.find_spec(module) is None:
         raise UsageError(f"{what}: needs the package {module}: pip install 'tiefmu[{extra}]'")
 

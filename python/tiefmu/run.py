@@ -10,10 +10,10 @@ import numpy as np
 
 from . import key_figures
 from .errors import RunError, UsageError
+from .fmu_instance import Fmu, Instance
 from .report import of_folder
 from .results import Kept, Result, writer
 from .signals import Experiment, Inputs, read_inputs
-from .slave import Fmu, Slave
 from .view.vtk import PvdFile
 
 STEPS = 500  # at least, where the caller leaves the step open
@@ -65,22 +65,22 @@ def run(
                 raise UsageError(f"{pvd[0]}: {fmu.name} was not made by tiefmu, so it does not say where its nodes are")
             moving = PvdFile(pvd[0], fmu, found, outputs, plan, pvd[1])
             sinks.append(moving)
-        slave = Slave(fmu, outputs)
+        instance = Instance(fmu, outputs)
         try:
-            result = simulate(slave, plan, outputs, sinks, stack.enter_context(progress(plan)))
+            result = simulate(instance, plan, outputs, sinks, stack.enter_context(progress(plan)))
         except BaseException:
             if moving:
                 moving.discard()
             raise
         finally:
-            slave.free()
+            instance.free()
         if moving:
             moving.close()
         return result, key_figures.lines(fmu, result, reactions, plan.step)
 
 
 def simulate(
-    slave: Slave,
+    instance: Instance,
     plan: Experiment,
     outputs: list[str],
     sinks: Sequence = (),
@@ -89,7 +89,7 @@ def simulate(
 ) -> Result:
     """Runs a new or reset instance. outputs: its outputs; sinks: further takers of blocks of rows, by `write`.
     Raises RunError, OSError."""
-    kept = Kept(outputs, {name: slave.fmu.unit(name) for name in outputs}, plan.rows)
+    kept = Kept(outputs, {name: instance.fmu.unit(name) for name in outputs}, plan.rows)
     reached = plan.start
 
     def finished(end):
@@ -98,7 +98,7 @@ def simulate(
         reached = end
 
     began, writing = time.perf_counter(), 0.0
-    for block in slave.blocks(plan, start_values, finished if bar is not None else None):
+    for block in instance.blocks(plan, start_values, finished if bar is not None else None):
         paused = time.perf_counter()
         for sink in (kept, *sinks):
             sink.write(block)

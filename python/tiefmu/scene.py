@@ -1,25 +1,23 @@
-"""Reading a scene: from TOML or a dict to the compiled model of the solver.
+"""A scene from its tables to the compiled model of the solver.
 
 Order: types (schema.py), mesh (mesh.py), then who is what - node tables, ties, springs, initial velocities - on arrays
 over all nodes of the mesh, in SI. Search and mechanics are checked by the solver when it compiles.
 """
 
-import os
 import re
 import sys
-from collections.abc import Sequence
 from enum import Enum
 from pathlib import Path
 
 import numpy as np
 
-from . import _core, decks, mesh, schema
+from . import _core, mesh, schema
 from ._core import SceneError
 from .mesh import properties
 from .mesh.data import listed
 from .mesh.properties import MOTIONS
 from .mesh.properties import NUMBERS as NODE_VALUES
-from .units import LENGTHS, MASSES, Units
+from .units import DIMENSIONS, LENGTHS, MASSES, Units
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -28,7 +26,7 @@ else:
 
 
 class Scene:
-    """A checked and compiled scene; made by `load`.
+    """A checked and compiled scene; made by `load` (loading.py).
 
     file: how messages call the source; name: of the model, from the file's name; title; notes, warnings: remarks of
     the reading (lists of str); ties: the [[tie]] tables in order; settings: the [model] table; rotations: ids of the
@@ -50,29 +48,6 @@ class Scene:
     def simulation(self) -> _core.Simulation:
         """A new simulation of this scene, as the FMU runs it; call `initialise(t)` first."""
         return _core.Simulation(self.model)
-
-
-def load(source, expose: Sequence[str] = (), folder: Path | None = None) -> Scene:
-    """Reads, checks and compiles a scene.
-
-    source: path of a TOML file or of a deck (decks/), or a dict of the same shape (NumPy arrays may stand for lists;
-    messages call it "scene"; a mesh file is taken relative to `folder`, by default the current one). expose: added to
-    [interface] expose of a TOML file or a dict. Raises SceneError, one line "FILE: table: id: message", on the first
-    thing that is wrong.
-    """
-    if isinstance(source, dict):
-        file, name, folder = "scene", "scene", folder or Path(".")
-    else:
-        file, name, folder = os.fspath(source), Path(source).stem, Path(source).parent
-        if decks.is_deck(Path(source)):
-            return decks.load(Path(source))
-    try:
-        raw = plain(source) if isinstance(source, dict) else read_toml(Path(source))
-        tables = schema.parse(raw)
-        tables.interface.expose += [name for name in expose if name not in tables.interface.expose]
-        return Scene(file, name, tables, folder)
-    except SceneError as error:
-        raise SceneError(one_line(f"{file}: {error}")) from None
 
 
 def one_line(message: str) -> str:
@@ -317,7 +292,7 @@ class Assembly:
                     continue
                 if isinstance(value, str):
                     value = choice(type(getattr(settings, key)), value)
-                elif key in ("gravity", "time_step"):
+                elif key in DIMENSIONS:
                     value = self.units.si(key, value)
                 setattr(settings, key, value)
         return settings

@@ -6,8 +6,8 @@ from pathlib import Path
 from .. import run as running
 from ..arguments import check_folder_of, positive
 from ..errors import UsageError
+from ..fmu_instance import Fmu, Instance
 from ..models import fmu_of
-from ..slave import Fmu, Slave
 from . import junit, pictures
 from .criteria import files, read
 from .judge import Judge, Judgement
@@ -48,12 +48,12 @@ def run_accept(options: argparse.Namespace) -> int:
         folder = criteria.parent
         judge = Judge(fmu, read(criteria), folder, name)
         plan = judge.plan(options.stop_time, options.step, options.input)
-        slave = Slave(fmu, judge.outputs)
+        instance = Instance(fmu, judge.outputs)
         try:
             with running.progress(plan) as bar:
-                judgement = judge.judge(slave, plan, bar)
+                judgement = judge.judge(instance, plan, bar)
         finally:
-            slave.free()
+            instance.free()
     if options.junit:
         junit.write(options.junit, Path(options.model).stem, judgement.verdicts, judgement.result.seconds)
     if options.pictures:

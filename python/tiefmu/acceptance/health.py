@@ -7,10 +7,10 @@ import numpy as np
 
 from .. import key_figures
 from ..errors import RunError, UsageError
+from ..fmu_instance import Fmu
 from ..report import of_folder
 from ..results import Result
 from ..signals import Experiment
-from ..slave import Fmu
 from .criteria import Health
 from .verdict import Curve, Verdict
 

@@ -9,12 +9,13 @@ from typing import Any
 import numpy as np
 
 from ..errors import RunError, UsageError
+from ..fmu_instance import Fmu, Instance
 from ..results import Result
 from ..run import experiment, simulate
 from ..signals import Experiment
-from ..slave import Fmu, Slave
 from . import health
 from .criteria import Against, Band, Criteria, Criterion, Limit, Rating
+from .iso18571 import RATE, ratings
 from .quantities import Collected, Points, Quantity, cut, prepared, reference
 from .verdict import Curve, Verdict
 
@@ -66,11 +67,11 @@ class Judge:
         return experiment(self.fmu, stop_time or run.stop_time, step or run.step, inputs)
 
     def judge(
-        self, slave: Slave, plan: Experiment, bar: Any = None, start_values: dict[str, float] | None = None
+        self, instance: Instance, plan: Experiment, bar: Any = None, start_values: dict[str, float] | None = None
     ) -> Judgement:
         """Runs the instance, which has the outputs of this judge; a second time, reset, for `half_step`."""
         collected = Collected([quantity for _, _, quantity in self.rows], self.outputs)
-        result = simulate(slave, plan, self.outputs, [collected], bar, start_values)
+        result = simulate(instance, plan, self.outputs, [collected], bar, start_values)
         time, signals = collected.signals()
         verdicts = []
         for (label, row, quantity), values in zip(self.rows, signals):
@@ -78,9 +79,9 @@ class Judge:
                 verdicts.append(self._one(label, row, quantity, time, values))
         again = None
         if self.criteria.health.half_step is not None:
-            slave.reset()
+            instance.reset()
             half = Experiment(plan.start, plan.stop, plan.step / 2, plan.inputs)
-            again = simulate(slave, half, self.outputs, start_values=start_values)
+            again = simulate(instance, half, self.outputs, start_values=start_values)
         try:
             verdicts += health.verdicts(self.criteria.health, self.fmu, plan, result, again)
         except UsageError as error:
@@ -143,8 +144,6 @@ def band(label: str, row: Band, unit: str, t: np.ndarray, x: np.ndarray, given: 
 
 def rating(label: str, row: Rating, unit: str, t: np.ndarray, x: np.ndarray, given: Points) -> Verdict:
     """By ISO/TS 18571, at 10 kHz, both linear between their rows."""
-    from .iso18571 import RATE, ratings
-
     rt, rx = given
     start, end = max(t[0], rt[0]), min(t[-1], rt[-1])
     count = int(np.floor((end - start) * RATE * (1 + 1e-12))) + 1 if end > start else 0

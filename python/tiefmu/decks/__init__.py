@@ -12,7 +12,9 @@ from pathlib import Path
 
 import numpy as np
 
+from .. import schema
 from .._core import SceneError
+from ..scene import Scene, one_line
 from . import abaqus, dyna, radioss, to_scene, write
 from .model import Deck
 from .settle import settle
@@ -109,15 +111,12 @@ def untangle(deck: Deck):
             )
 
 
-def load(path: Path, ties: list[str] | None = None, free: tuple[str, ...] = ()):
+def load(path: Path, ties: list[str] | None = None, free: tuple[str, ...] = ()) -> Scene:
     """The compiled Scene of a deck."""
     return compiled(read(path, ties, free))
 
 
-def compiled(found: Imported):
-    from .. import schema
-    from ..scene import Scene, one_line
-
+def compiled(found: Imported) -> Scene:
     path = Path(found.deck.file)
     with tempfile.TemporaryDirectory(prefix="tiefmu-") as folder:
         tables = write.files(found, Path(folder), path.stem, to_keep=False)

@@ -4,6 +4,7 @@ import sys
 from pathlib import Path
 
 from .._core import SceneError
+from . import import_deck
 
 
 def add_parser(commands):
@@ -36,8 +37,6 @@ def add_parser(commands):
 
 
 def run(options):
-    from . import import_deck
-
     output = options.output or Path(f"{options.deck.stem}.toml")
     if output.suffix.lower() != ".toml":
         raise SceneError(f"{output}: a scene file is called NAME.toml")

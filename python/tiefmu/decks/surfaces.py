@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from .element_lengths import hex_volume, shell_area, tetra_length
 from .model import SHELLS, SOLIDS, Deck, Elements, Faces
 
 # Corners of the faces of solids, seen from outside counter-clockwise; -1 closes a triangle.
@@ -40,8 +41,6 @@ def solid_faces(deck: Deck, elements: Elements, which: np.ndarray) -> tuple[Face
 
 def depth(deck: Deck, kind: str, nodes: np.ndarray) -> np.ndarray:
     """Volume over the area of the largest face: t_m of a solid in the tolerance of a tie."""
-    from .element_properties import hex_volume, shell_area, tetra_length
-
     x = deck.position[nodes]
     if kind in ("tet4", "tet10"):
         volume, length = tetra_length(x[:, :4])

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..schema import found, shortened
 from . import abaqus_cards as cards
-from . import fields
+from . import fortran_numbers
 from .data import Block, Sets
 
 # Families of elements and the number of nodes behind their names: shells, membranes, surface, rigid and plane
@@ -234,7 +234,7 @@ READ = {
 
 def whole(items: list[str]) -> np.ndarray:
     """Ids; ValueError for what is none."""
-    values = fields.whole(items)
+    values = fortran_numbers.whole(items)
     if values.min(initial=1) < 1:
         raise ValueError
     return values

@@ -13,7 +13,7 @@ import numpy as np
 
 from .._core import SceneError
 from ..schema import shortened
-from .fields import FieldError, numbers, table, whole
+from .fortran_numbers import FieldError, numbers, table, whole
 
 MOST_INCLUDES = 1000
 # Parameters without a value, which may stand alone on the line that a keyword line goes on to.

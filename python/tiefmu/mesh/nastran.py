@@ -14,9 +14,9 @@ from .._core import SceneError
 from ..schema import shortened
 from .data import Block, MeshFile, Sets, find
 from .faces import CORNERS
-from .fields import FieldError
-from .fields import numbers as fortran_numbers
-from .fields import whole as fortran_whole
+from .fortran_numbers import FieldError
+from .fortran_numbers import numbers as fortran_numbers
+from .fortran_numbers import whole as fortran_whole
 
 # card: shape, most nodes, field of the first node, field of the property or None (fields behind the name, from 0)
 ELEMENTS = {

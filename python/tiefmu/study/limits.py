@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from .. import _core
-from ..scene import Scene, load
+from ..loading import load
+from ..scene import Scene
 from .hosts import Coupling, InProcess, Masses
 
 GROWS = 1 + 1e-7  # growth a step that counts: above the rounding of an eigenvalue, below what 2 % off a limit makes

@@ -3,7 +3,7 @@
 import numpy as np
 
 from .. import _core
-from ..scene import load
+from ..loading import load
 from .limits import SQUARE, FreeRun, Limit, Value, coupled, plate
 from .stability_geometry import clamp_values, drift_values, geometry_limits, orientation_values
 

@@ -4,7 +4,7 @@ import numpy as np
 
 from .. import _core
 from .._core import SceneError
-from ..scene import load
+from ..loading import load
 from .limits import SQUARE, Limit, Value
 
 # ------------------------------------------------------------------------------------------------------- 6: orientation

@@ -13,7 +13,8 @@ from ..acceptance import command as acceptance
 from ..arguments import check_folder_of, whole
 from ..errors import UsageError
 from ..results import needed
-from ..scene import load, read_toml
+from ..loading import load
+from ..scene import read_toml
 from . import table, worker
 from .design import Case, Sweep, cases, read, variant
 from .journal import Journal

@@ -14,9 +14,9 @@ from ..acceptance.judge import Judge
 from ..errors import RunError, SceneError, StepTooLong, UsageError
 from ..package import build
 from ..run import experiment, simulate
-from ..scene import load
+from ..loading import load
 from ..signals import Experiment
-from ..slave import Fmu, Slave
+from ..fmu_instance import Fmu, Instance
 
 KEPT = 16  # unpacked FMUs that a thread of a worker holds
 _here = threading.local()  # an instance belongs to one thread
@@ -80,11 +80,11 @@ class Ready:
         self.outputs = [name for name in known if name in wanted]
         if self.judge:
             self.judge.outputs = self.outputs
-        self.slave: Slave | None = None
+        self.instance: Slave | None = None
 
     def close(self) -> None:
-        if self.slave:
-            self.slave.free()
+        if self.instance:
+            self.instance.free()
         self.fmu.__exit__()
         self._folder.cleanup()
 
@@ -103,25 +103,25 @@ class Ready:
         plan = Experiment(self.plan.start, self.plan.stop, self.plan.step, inputs)
         row: dict = {"message": ""}
         try:
-            if self.slave:
-                self.slave.reset()
+            if self.instance:
+                self.instance.reset()
             else:
-                self.slave = Slave(self.fmu, self.outputs)
+                self.instance = Instance(self.fmu, self.outputs)
             if self.judge:
-                judgement = self.judge.judge(self.slave, plan, start_values=start_values)
+                judgement = self.judge.judge(self.instance, plan, start_values=start_values)
                 row["passed"] = judgement.passed
                 row |= {verdict.name: float(verdict.value) for verdict in judgement.verdicts}
                 result = judgement.result
             else:
-                result = simulate(self.slave, plan, self.outputs, start_values=start_values)
+                result = simulate(self.instance, plan, self.outputs, start_values=start_values)
             for name in task.signals:
                 row.setdefault("time", result["time"].tolist())
                 row[name] = result[name].tolist()
         except (RunError, UsageError, StepTooLong) as error:
             row = {"message": str(error)}
-            if self.slave:  # it may be in any state
-                self.slave.free()
-                self.slave = None
+            if self.instance:  # it may be in any state
+                self.instance.free()
+                self.instance = None
         return row
 
 

@@ -13,7 +13,7 @@ from ..errors import UsageError
 from ..html_page import bullets, document, paragraph, table
 from ..report import of_fmu, report, summary
 from ..results import needed
-from ..scene import load
+from ..loading import load
 from .geometry import Geometry
 
 DRAWN = 20_000  # slaves at most, those farthest from their segments

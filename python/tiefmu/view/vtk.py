@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 
 from ..errors import UsageError
+from ..fmu_instance import Fmu
 from ..scene import MOTIONS
 from ..schema import suggestion
 from ..signals import Experiment
-from ..slave import Fmu
 from .geometry import Geometry
 
 FRAMES = 100  # of a run, unless asked for otherwise

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..element_properties import shell_area
+from ..element_lengths import hex_volume, shell_area, tetra_length
 from ..model import SHELLS, Deck, Fixed, Initial, RigidBody
 from ..selected import Selected
 from .cards import Block
@@ -231,8 +231,6 @@ def mass_of_parts(deck: Deck, sets: Sets, block: Block):
 
 def element_sizes(deck: Deck, kind: str, nodes: np.ndarray) -> np.ndarray:
     """Area of shells, volume of solids, length of others."""
-    from ..element_properties import hex_volume, tetra_length
-
     x = deck.position[np.where(nodes < 0, nodes[:, [0]], nodes)]
     if kind == "shell4":
         return shell_area(x)

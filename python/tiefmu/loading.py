@@ -1,0 +1,32 @@
+"""Loading what stands for a scene: a TOML file, a deck or a dict."""
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
+from . import decks, schema
+from ._core import SceneError
+from .scene import Scene, one_line, plain, read_toml
+
+
+def load(source, expose: Sequence[str] = (), folder: Path | None = None) -> Scene:
+    """Reads, checks and compiles a scene.
+
+    source: path of a TOML file or of a deck (decks/), or a dict of the same shape (NumPy arrays may stand for lists;
+    messages call it "scene"; a mesh file is taken relative to `folder`, by default the current one). expose: added to
+    [interface] expose of a TOML file or a dict. Raises SceneError, one line "FILE: table: id: message", on the first
+    thing that is wrong.
+    """
+    if isinstance(source, dict):
+        file, name, folder = "scene", "scene", folder or Path(".")
+    else:
+        file, name, folder = os.fspath(source), Path(source).stem, Path(source).parent
+        if decks.is_deck(Path(source)):
+            return decks.load(Path(source))
+    try:
+        raw = plain(source) if isinstance(source, dict) else read_toml(Path(source))
+        tables = schema.parse(raw)
+        tables.interface.expose += [name for name in expose if name not in tables.interface.expose]
+        return Scene(file, name, tables, folder)
+    except SceneError as error:
+        raise SceneError(one_line(f"{file}: {error}")) from None
