@@ -8,6 +8,7 @@ from in_process import Run
 from independent import Problem, constant
 from random_scenes import structure
 from scipy.integrate import simpson
+from tiefmu.study.variants import METHODS
 
 END = 0.4
 FORMS = [("default", True), ("default", False), ("optimized", False), ("optimized", True)]
@@ -140,10 +141,15 @@ def test_small_geometry(inertia, formulation, rotations):
     assert difference(program, problem, solution[-1]) < 1e-8
 
 
+ORDERS = {"central-difference": 2, "symplectic-euler": 1, "noh-bathe": 2, "rk4": 4}
+
+
+def test_every_method_has_an_order():
+    assert set(ORDERS) == set(METHODS)
+
+
 @forms
-@pytest.mark.parametrize(
-    "method, order", [("central-difference", 2), ("symplectic-euler", 1), ("noh-bathe", 2), ("rk4", 4)]
-)
+@pytest.mark.parametrize("method, order", ORDERS.items())
 def test_order(method, order, formulation, rotations):
     """Three halvings divide the error of the motion by 2^order each; consistent inertia, finite rotation."""
     scene, inputs, problem, solution = case("swinging", formulation, rotations, "consistent")
@@ -187,9 +193,7 @@ def test_damped_oscillator():
 
 
 @forms
-@pytest.mark.parametrize(
-    "method, order", [("central-difference", 2), ("symplectic-euler", 1), ("noh-bathe", 2), ("rk4", 4)]
-)
+@pytest.mark.parametrize("method, order", ORDERS.items())
 def test_energy_of_consistent_inertia_is_constant_to_the_order(method, order, formulation, rotations):
     scene, inputs, *_ = case("swinging", formulation, rotations, "consistent")
     changes = [run(scene, inputs, method, steps)[1] for steps in (100, 200, 400, 800)]

@@ -8,6 +8,7 @@ import pytest
 from random_scenes import one_segment
 from tiefmu import _core, schema
 from tiefmu.scene import Assembly
+from tiefmu.study import speed_accuracy_charts, stability_cases, variants
 
 TABLES = (schema.Model, schema.Integrator, schema.Interface)
 CHOICES = [
@@ -34,6 +35,12 @@ def literals(annotation) -> list[str]:
 def test_a_choice_has_the_words_of_its_enumeration(table, key, kind):
     words = literals(table.model_fields[key].annotation)
     assert [word.replace("-", "_") for word in words] == [value.name for value in kind]
+
+
+def test_studies_know_every_method():
+    methods = set(literals(schema.Integrator.model_fields["method"].annotation))
+    assert set(variants.METHODS) == methods == set(stability_cases.METHODS)
+    assert methods <= set(speed_accuracy_charts.COLOURS) and methods <= set(speed_accuracy_charts.MARKERS)
 
 
 def test_the_solver_has_every_key_and_no_other():
