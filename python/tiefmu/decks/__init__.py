@@ -14,6 +14,8 @@ import numpy as np
 
 from .. import schema
 from .._core import SceneError
+from ..arguments import check_folder_of
+from ..errors import UsageError
 from ..scene import Scene, one_line
 from . import abaqus, dyna, radioss, to_scene, write
 from .model import Deck
@@ -50,12 +52,13 @@ def is_deck(path: Path) -> bool:
 
 def read(path: Path, ties: list[str] | None = None, free: tuple[str, ...] = ()) -> Imported:
     """Reads a deck. ties: names or ids of the ties to take, None: all; free: names or ids of parts or node sets whose
-    masters the FMU moves itself. SceneError, one line "FILE: line N: /KEYWORD: message", on what is wrong."""
+    masters the FMU moves itself. SceneError, one line "FILE: line N: /KEYWORD: message", on what is wrong; UsageError
+    where there is no deck."""
     if not path.is_file():
-        raise SceneError(f"{path}: no such file")
+        raise UsageError(f"{path}: no such file")
     reader = language(path)
     if reader is None:
-        raise SceneError(
+        raise UsageError(
             f"{path}: is no deck; Radioss starter decks, LS-DYNA keyword decks and Abaqus or CalculiX input files with "
             "*TIE can be imported"
         )
@@ -132,8 +135,7 @@ def compiled(found: Imported) -> Scene:
 
 def import_deck(deck: Path, scene: Path, ties: list[str] | None = None, free: tuple[str, ...] = ()) -> Imported:
     """Writes the scene of a deck: `scene` and, beside it, its mesh and its node properties."""
-    if not scene.parent.is_dir():
-        raise SceneError(f"{scene}: folder {scene.parent} does not exist")
+    check_folder_of(scene)
     found = read(deck, ties, free)
     compiled(found)  # what cannot be built is not written
     write.scene(found, scene)

@@ -3,7 +3,7 @@
 import sys
 from pathlib import Path
 
-from .._core import SceneError
+from ..errors import UsageError
 from . import import_deck
 
 
@@ -39,7 +39,7 @@ def add_parser(commands):
 def run(options):
     output = options.output or Path(f"{options.deck.stem}.toml")
     if output.suffix.lower() != ".toml":
-        raise SceneError(f"{output}: a scene file is called NAME.toml")
+        raise UsageError(f"{output}: a scene file is called NAME.toml")
     found = import_deck(options.deck, output, options.tie, tuple(options.free))
     for line in found.deck.warnings:
         print(f"warning: {line}", file=sys.stderr)
