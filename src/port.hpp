@@ -1,4 +1,4 @@
-// Rigid ports: many nodes as one body of six degrees of freedom about a reference point.
+// Rigid ports: many nodes as one body of six degrees of freedom about a reference point, theory (3.9) to (3.14).
 //
 // A port of driven nodes moves them, v_i = v + w x r_i with arms r_i = R r_i0, R advanced by the exponential map, and
 // sums what ties and springs do to them: f = sum f_i, t = sum t_i + r_i x f_i.
@@ -7,9 +7,9 @@
 //   v = (1/N) sum v_s + w x e        w = J^-1 (sum r_s x v_s + L2 sum w_s)
 //   f_s = f/N + A x r_s              m_s = L2 A        A = J^-1 (t + e x f)
 //   J = sum ((r_s.r_s) 1 - r_s r_s^T + L2 1)
-// with r_s from the slaves' mean and e from there to the reference point. L2 is zero but for slaves on a line, where
-// positions leave a rotation open and the turning slaves' own (those in the sums with L2) decide it. So
-// f.v + t.w = sum f_s.v_s + m_s.w_s, and force and moment are exact.
+// with r_s from the slaves' mean and e from there to the reference point. L2 is zero except for slaves on a line,
+// whose places leave the rotation about it open: then the own rotations of those that can turn decide it, and only they
+// are in the sums with L2. So f.v + t.w = sum f_s.v_s + m_s.w_s, and force and moment are exact.
 #pragma once
 
 #include <string>

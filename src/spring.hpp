@@ -17,15 +17,15 @@ struct SpringLoad {
   double energy = 0, dissipation = 0;
 };
 
-// Axial: stiffness times the elongation along the current line, damping times its rate.
-// Bushing: translation D = x_a - x_b - R_b arm, rotation vector of R_b R_a^T, both resolved in the inertial axes; the
-// moment of the force on a about b is balanced on b. With isotropic stiffness the forces derive from
-// (k D.D + kr theta.theta) / 2.
+// Axial, theory (3.5): stiffness times the elongation along the current line, damping times its rate.
+// Bushing, theory (3.6) to (3.8): translation u = x_a - x_b - R_b arm, rotation vector theta of R_b R_a^T, both in
+// inertial axes; the moment of the force on a about b is balanced on b. With isotropic stiffness the forces derive from
+// (k u.u + kr theta.theta) / 2.
 SpringLoad springLoad(const Spring& spring, const EndMotion& a, const EndMotion& b);
 
-// The linear part about the present state, material stiffness and the tension's transverse one: displacement u and
-// small rotation (in x and w of EndMotion: `v`, `w` are read) to restoring loads. With `damping` the damping
-// coefficients in place of the stiffness. Symmetric and positive semidefinite.
+// The linear part about the present state, of the material and of an axial spring's tension across its line: from a
+// displacement and a small rotation of the ends, given as their `v` and `w`, to restoring loads. With `damping` the
+// damping coefficients in place of the stiffness. Symmetric and positive semidefinite.
 SpringLoad springTangent(const Spring& spring, const EndMotion& a, const EndMotion& b, bool damping);
 
 // Change of springLoad when the ends' x, v and w change by da and db (their rotations stay): exact, to first order.

@@ -29,11 +29,11 @@ void mapMotion(const TieGroup& group, SegmentRange range, TieGeometry geometry, 
 void distributeLoads(const TieGroup& group, SegmentRange range, TieGeometry geometry, const double* force,
                      const double* moment, double* f, double* t);
 
-// (a_s, z_s) += b, the part of the slaves' acceleration that is quadratic in velocities (theory 2).
+// (a_s, z_s) += b, the part of the slaves' acceleration that is quadratic in velocities. [theory (2.3), (2.7)]
 void addBias(const TieGroup& group, SegmentRange range, TieGeometry geometry, const double* velocity,
              const double* spin, double* as, double* zs);
 
-// x_s: 3 per slave, from node positions and offsets (m).
+// x_s: 3 per slave, from node positions and offsets (m). [theory (2.9)]
 void place(const TieGroup& group, SegmentRange range, TieGeometry geometry, const double* position, double* xs);
 
 // Arms, centres and Ibar^-1 of meanMotion segments at these node positions. False: one has collapsed to a line or a
@@ -41,14 +41,14 @@ void place(const TieGroup& group, SegmentRange range, TieGeometry geometry, cons
 bool updateFrames(const TieGroup& group, SegmentRange range, const double* position, SegmentFrame* frame);
 
 // Offsets of a rotation group turned by exp(h w_P), their length held at 1/sqrt(inverseLength2) to rounding.
-// `inverseLength2`: 1/d0^2 per slave, 0 for d0 = 0.
+// `inverseLength2`: 1/d0^2 per slave, 0 for d0 = 0. [theory (2.10)]
 void turnOffsets(const TieGroup& group, SegmentRange range, double h, const double* spin, const double* inverseLength2,
                  double* offset);
 
 // meanMotion segments over a step in which their nodes move from `position` by h `velocity`: the frames at its end, and
 // (unless null) the rotation, a unit quaternion (w, x, y, z) per segment. The rotation is the Cayley map of h w / 2, w
 // at mid step: of all second-order choices the one that turns with a segment that rotates rigidly exactly, since its
-// nodes then move by 2 tan(angle / 2) n x r_mid. False as above.
+// nodes then move by 2 tan(angle / 2) n x r_mid, theory (2.11). False as above.
 bool moveSegments(const TieGroup& group, SegmentRange range, double h, const double* position, const double* velocity,
                   SegmentFrame* frame, double* rotation);
 
@@ -56,7 +56,7 @@ bool moveSegments(const TieGroup& group, SegmentRange range, double h, const dou
 void rotateOffsets(const TieGroup& group, SegmentRange range, const double* rotation, const double* initialOffset,
                    double* offset);
 
-// Angular velocity of each meanMotion segment: w = Ibar^-1 sum r x v. `spin`: 3 per segment.
+// Angular velocity of each meanMotion segment: w = Ibar^-1 sum r x v. `spin`: 3 per segment. [theory (2.5)]
 void meanSpin(const TieGroup& group, SegmentRange range, const SegmentFrame* frame, const double* velocity,
               double* spin);
 

@@ -177,7 +177,7 @@ TIEFMU_INLINE void biasRotation(const TieView& tie, const double* offset, const 
   });
 }
 
-// z_b = -Ibar^-1 (dIbar/dt) w, dIbar/dt = sum 2 (r.r') 1 - r' r^T - r r'^T.
+// Theory (2.8): z_b = -Ibar^-1 (dIbar/dt) w, dIbar/dt = sum 2 (r.r') 1 - r' r^T - r r'^T.
 template <int N>
 TIEFMU_INLINE void biasMeanMotion(const TieView& tie, TieGeometry geometry, const double* v, double* as, double* zs) {
   eachSegment<N>(tie, [&](int e, Corners<N> nodes, std::ptrdiff_t s, std::ptrdiff_t last) TIEFMU_INLINED {

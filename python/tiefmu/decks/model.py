@@ -213,6 +213,25 @@ class Deck:
         place = np.minimum(np.searchsorted(self._sorted, ids), len(self.node_id) - 1)
         return np.where(self._sorted[place] == ids, self._order[place], -1)
 
+    def merge_repeated_nodes(self, keyword: str, fail: Callable[[int, str], object]) -> np.ndarray:
+        """The same node written twice, as includes do, is one node. fail(row, text): of one that is repeated elsewhere.
+        Returns the rows that are kept."""
+        rows = np.arange(len(self.node_id))
+        order = np.argsort(self.node_id, kind="stable")
+        twice = order[1:][self.node_id[order][1:] == self.node_id[order][:-1]]
+        if not len(twice):
+            return rows
+        first = order[np.searchsorted(self.node_id[order], self.node_id[twice])]
+        other = (self.position[first] != self.position[twice]).any(axis=1)
+        if other.any():
+            row = int(twice[other][0])
+            fail(row, f"node {self.node_id[row]} is repeated at another place")
+        self.notes.append(f"{keyword}: {len(twice)} nodes are written twice at the same place; they count once")
+        kept = np.setdiff1d(rows, twice)
+        self.node_id, self.position = self.node_id[kept], self.position[kept]
+        self.__dict__.pop("_order", None)  # the index of node ids is of before
+        return kept
+
     def warn(self, text: str):
         if text not in self.warnings:
             self.warnings.append(text)

@@ -53,26 +53,8 @@ def read_nodes(deck: Deck, blocks: list[Block], transformations: list[Block]) ->
     if not np.isfinite(deck.position).all():
         first = int(np.argmin(np.isfinite(deck.position).all(axis=1)))
         blocks[block_of[first]].fail(f"node {deck.node_id[first]}: is not finite")
-    merge_repeated(deck, blocks, block_of)
+    deck.merge_repeated_nodes("*NODE", lambda row, text: blocks[block_of[row]].fail(text))
     return held
-
-
-def merge_repeated(deck: Deck, blocks: list[Block], block_of: np.ndarray):
-    """The same node written twice, as includes do, is one node."""
-    order = np.argsort(deck.node_id, kind="stable")
-    same = deck.node_id[order][1:] == deck.node_id[order][:-1]
-    twice = order[1:][same]
-    if not len(twice):
-        return
-    first = order[np.searchsorted(deck.node_id[order], deck.node_id[twice])]
-    other = (deck.position[first] != deck.position[twice]).any(axis=1)
-    if other.any():
-        node = twice[other][0]
-        blocks[block_of[node]].fail(f"node {deck.node_id[node]} is repeated at another place")
-    deck.notes.append(f"*NODE: {len(twice)} nodes are written twice at the same place; they count once")
-    keep = np.setdiff1d(np.arange(len(deck.node_id)), twice)
-    deck.node_id, deck.position = deck.node_id[keep], deck.position[keep]
-    deck.__dict__.pop("_order", None)  # the index of node ids is of before
 
 
 class Collected:

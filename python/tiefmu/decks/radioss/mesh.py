@@ -36,19 +36,7 @@ def read_nodes(deck: Deck, blocks: list[Block]) -> np.ndarray:
         if bad.any():
             first = int(np.argmax(bad))
             blocks[block_of[first]].fail(f"node {deck.node_id[first]}: {words}")
-    order = np.argsort(deck.node_id, kind="stable")
-    twice = order[1:][deck.node_id[order][1:] == deck.node_id[order][:-1]]
-    if len(twice):
-        # the same node written twice, as includes do, is one node
-        first = order[np.searchsorted(deck.node_id[order], deck.node_id[twice])]
-        other = (deck.position[first] != deck.position[twice]).any(axis=1)
-        if other.any():
-            node = twice[other][0]
-            blocks[block_of[node]].fail(f"node {deck.node_id[node]} is repeated at another place")
-        deck.notes.append(f"/NODE: {len(twice)} nodes are written twice at the same place; they count once")
-        keep = np.setdiff1d(np.arange(len(deck.node_id)), twice)
-        deck.node_id, deck.position, block_of = deck.node_id[keep], deck.position[keep], block_of[keep]
-    return block_of
+    return block_of[deck.merge_repeated_nodes("/NODE", lambda row, text: blocks[block_of[row]].fail(text))]
 
 
 def read_elements(deck: Deck, blocks: list[Block]):
