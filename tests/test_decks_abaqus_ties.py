@@ -279,7 +279,7 @@ def test_ties_are_chosen_by_name_and_pairs_of_one_tie_kept_apart(tmp_path):
 def test_a_mesh_is_no_deck(tmp_path):
     made = deck()
     assert not decks.is_deck(made.write(tmp_path / "mesh.inp"))
-    with pytest.raises(decks.SceneError, match="is no deck"):
+    with pytest.raises(decks.UsageError, match="is no deck"):
         decks.read(tmp_path / "mesh.inp")
     assert decks.is_deck(made.tie("pins", "quads").write(tmp_path / "deck.inp"))
     assert not decks.is_deck(deck().block("HEADING", "** *TIE").write(tmp_path / "mesh.inp"))

@@ -12,8 +12,8 @@ from typing import Any
 from ..acceptance import command as acceptance
 from ..arguments import check_folder_of, whole
 from ..errors import UsageError
-from ..results import needed
 from ..loading import load
+from ..results import needed
 from ..scene import read_toml
 from . import table, worker
 from .design import Case, Sweep, cases, read, variant

@@ -12,11 +12,11 @@ import numpy as np
 from ..acceptance.criteria import read
 from ..acceptance.judge import Judge
 from ..errors import RunError, SceneError, StepTooLong, UsageError
+from ..fmu_instance import Fmu, Instance
+from ..loading import load
 from ..package import build
 from ..run import experiment, simulate
-from ..loading import load
 from ..signals import Experiment
-from ..fmu_instance import Fmu, Instance
 
 KEPT = 16  # unpacked FMUs that a thread of a worker holds
 _here = threading.local()  # an instance belongs to one thread
@@ -80,7 +80,7 @@ class Ready:
         self.outputs = [name for name in known if name in wanted]
         if self.judge:
             self.judge.outputs = self.outputs
-        self.instance: Slave | None = None
+        self.instance: Instance | None = None
 
     def close(self) -> None:
         if self.instance:

@@ -11,9 +11,9 @@ from .. import __version__, sections
 from ..arguments import check_folder_of, existing, is_fmu
 from ..errors import UsageError
 from ..html_page import bullets, document, paragraph, table
+from ..loading import load
 from ..report import of_fmu, report, summary
 from ..results import needed
-from ..loading import load
 from .geometry import Geometry
 
 DRAWN = 20_000  # slaves at most, those farthest from their segments
