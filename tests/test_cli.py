@@ -311,12 +311,14 @@ def test_exit_statuses_of_the_process(weld, scene_file, command):
     assert nothing.returncode == 2 and "COMMAND" in nothing.stderr and "Traceback" not in nothing.stderr
 
 
-@pytest.mark.parametrize("name", ["build", "info", "run", "demo"])
+@pytest.mark.parametrize("name", ["build", "info", "run", "accept", "report", "sweep", "demo"])
 def test_help(capsys, name):
     with pytest.raises(SystemExit) as stop:
         main([name, "--help"])
     assert stop.value.code == 0
-    assert f"usage: tiefmu {name}" in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert f"usage: tiefmu {name}" in said
+    assert f"example: tiefmu {name}" in " ".join(said.split())
 
 
 def test_version(capsys):

@@ -6,6 +6,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 import pyarrow.parquet
@@ -244,6 +245,7 @@ def test_a_worker_that_is_killed_in_mid_sweep(folder):
         processes.append(sweep)
         wait_for(lambda: journal_rows() > 10)
         workers[0].send_signal(signal.SIGKILL)
+        assert journal_rows() < 240 and sweep.poll() is None
         out, error = sweep.communicate(timeout=120)
         assert sweep.returncode == 0, error
         assert "240 cases" in out
@@ -267,6 +269,15 @@ def wait_for(holds, seconds=120.0) -> None:
     while not holds():
         assert time.monotonic() < end
         time.sleep(0.05)
+
+
+def test_the_page_names_every_key():
+    text = (Path(__file__).resolve().parents[1] / "docs" / "sweep.md").read_text()
+    for model in (design.Sweep, *design.TABLES.values()):
+        for key, field in model.model_fields.items():
+            assert f"`{field.alias or key}`" in text, key
+            for value in get_args(field.annotation):
+                assert not isinstance(value, str) or f'`"{value}"`' in text, value
 
 
 # --------------------------------------------------------------------------------------------------------------- errors

@@ -61,7 +61,10 @@ def parser() -> argparse.ArgumentParser:
     commands = top.add_subparsers(required=True, metavar="COMMAND")
 
     build = commands.add_parser(
-        "build", help="write the FMU of a scene", description="Reads, checks and searches the scene and writes its FMU."
+        "build",
+        help="write the FMU of a scene",
+        description="Reads, checks and searches the scene and writes its FMU.",
+        epilog="example: tiefmu build weld.toml -o out/weld.fmu",
     )
     build.add_argument("scene", metavar="SCENE", help="scene file (TOML)")
     build.add_argument(
@@ -87,6 +90,7 @@ def parser() -> argparse.ArgumentParser:
         "info",
         help="report how the slaves are tied, limits, what was left out",
         description="Prints the tie report of a scene, or the one that an FMU carries.",
+        epilog="example: tiefmu info weld.toml --vtu ties.vtu",
     )
     info.add_argument("model", metavar="SCENE-or-FMU", help="scene file (TOML) or FMU made by tiefmu")
     info.add_argument("--json", action="store_true", help="the whole report as JSON")
@@ -103,6 +107,7 @@ def parser() -> argparse.ArgumentParser:
         help="co-simulate a scene or an FMU with FMPy",
         description="Co-simulates with FMPy. CSV columns are `time` (s) and variable names such as slave[1].f[3], SI "
         "units; inputs without a column keep their start value, and are linear between the rows.",
+        epilog="example: tiefmu run weld.fmu --input in.csv --output out.csv --plot out.png",
     )
     run.add_argument("model", metavar="SCENE-or-FMU", help="scene file (TOML) or FMU")
     run.add_argument("--stop-time", metavar="T", type=positive, help="end, s (default: of the input, or of the FMU)")
@@ -134,6 +139,7 @@ def parser() -> argparse.ArgumentParser:
         help="build and run the example scenes",
         description="Builds the example scenes, runs each as an FMU, prints a summary, writes "
         "FMUs, CSVs and pictures. Inputs come from NAME.csv beside NAME.toml.",
+        epilog="example: tiefmu demo --out out",
     )
     demo.add_argument("--out", metavar="DIR", type=Path, default=Path("out"), help="folder to write to (default: out)")
     demo.add_argument("--scenes", metavar="DIR", type=Path, help="folder of the scenes (default: of the checkout)")

@@ -126,7 +126,12 @@ def client(scheduler: str | None, workers: int | None) -> Iterator[Any]:
     import dask
     from distributed import Client, LocalCluster
 
-    quiet = {"distributed.logging.distributed": "error", "distributed.scheduler.allowed-failures": RETRIES}
+    quiet = {
+        "distributed.logging.distributed": "error",
+        "distributed.scheduler.allowed-failures": RETRIES,
+        "distributed.worker.profile.enabled": False,  # it looks at the stack of every worker 100 times a second
+        "distributed.admin.system-monitor.interval": "10s",
+    }
     with dask.config.set(quiet):
         if scheduler:
             try:
@@ -137,7 +142,7 @@ def client(scheduler: str | None, workers: int | None) -> Iterator[Any]:
             return
         with (
             LocalCluster(
-                n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=None,
+                n_workers=workers, threads_per_worker=1, processes=True, dashboard_address="127.0.0.1:0",
                 silence_logs=logging.CRITICAL,
             ) as cluster,
             Client(cluster) as connected,
@@ -180,7 +185,7 @@ def run_cases(
     with tqdm(total=total, initial=total - len(left), unit="case", delay=1, disable=None, leave=False) as bar:
 
         def fill() -> None:
-            most = AHEAD * max(1, len(connected.scheduler_info(n_workers=-1)["workers"]))
+            most = AHEAD * max(1, len(connected.ncores()))
             while len(running) < most:
                 batch = next(batches, None)
                 if batch is None:

@@ -109,7 +109,7 @@ def viewer(geometry: Geometry, found: dict) -> str:
     figure.add_trace(lines(outline, EDGE, 2, "edges"))
     figure.add_trace(lines(np.stack([feet, places], axis=1), "#bb4400", 2, "to the projection"))
     figure.add_trace(points(geometry.positions, masters, "nodes", {"size": 3, "color": MASTER}))
-    bar = {"title": {"text": "distance [m]"}, "thickness": 14}
+    bar = {"title": {"text": "distance [m]", "side": "right"}, "thickness": 14}
     look = {"size": 5, "color": distances, "colorscale": "Viridis", "colorbar": bar, "showscale": True}
     shown = f"slaves (the {DRAWN} farthest of {len(rows)})" if len(rows) > DRAWN else "slaves"
     figure.add_trace(points(places, words, shown, look))
@@ -124,7 +124,11 @@ def viewer(geometry: Geometry, found: dict) -> str:
     figure.update_layout(
         height=640,
         margin={"l": 0, "r": 0, "t": 0, "b": 0},
-        scene={"aspectmode": "data", **{f"{axis}axis": {"title": {"text": f"{axis} [m]"}} for axis in "xyz"}},
+        scene={
+            "aspectmode": "data",
+            "camera": {"eye": {"x": 1.5, "y": 1.5, "z": 1.5}},
+            **{f"{axis}axis": {"title": {"text": f"{axis} [m]"}} for axis in "xyz"},
+        },
         legend={"x": 0, "y": 1},
     )
     return figure.to_html(full_html=False, include_plotlyjs=True, div_id="picture", config={"displaylogo": False})
