@@ -419,6 +419,23 @@ def test_every_search_is_that_of_trying_all_segments(seed, method, reach, away):
             np.testing.assert_allclose(local, [projection.xi, projection.eta], atol=1e-11 + 1e-14 * away)
 
 
+@pytest.mark.parametrize("count", [1, 4, 5, 16, 17, 64, 65, 300])
+@pytest.mark.parametrize("spread", [0.0, 1.0])
+def test_the_tree_leaves_out_no_segment(count, spread):
+    """Rectangles of sizes 0.01 to 1 in every direction, also all round one place; against each by itself."""
+    rng = np.random.default_rng(count)
+    square = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
+    place, size = spread * rng.uniform(-2, 2, (count, 1, 3)), 10 ** rng.uniform(-2, 0, (count, 1, 1))
+    corners = np.array([square @ rotation(rng).T for _ in range(count)]) * size + place
+    slaves = rng.uniform(-2.5, 2.5, (300, 3))
+    each = [kernels.project(x, slaves) for x in corners]
+    distance = np.array([np.where(p["converged"] & (p["outside"] <= 1.5), p["nearest"], np.inf) for p in each])
+    found = search(corners.reshape(-1, 3), np.arange(4 * count).reshape(-1, 4), slaves, reach=100.0)
+    none = np.isinf(distance.min(axis=0))
+    assert (found["segment"] == np.where(none, -1, distance.argmin(axis=0))).all()
+    np.testing.assert_allclose(found["distance"][~none], distance.min(axis=0)[~none], rtol=1e-14)
+
+
 # ------------------------------------------------------------------------------------------------------ what is told
 
 
