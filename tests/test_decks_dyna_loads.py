@@ -244,6 +244,7 @@ def test_keywords_that_are_not_understood_are_named_with_their_line(tmp_path):
     made = deck().block("NEWTHING_OF_SORTS", ("i", 1)).block("CONSTRAINED_INTERPOLATION", ("i", 1))
     made.block("DATABASE_BINARY_D3PLOT", ("r", 1.0)).block("ELEMENT_SEATBELT", ("I", 1)).block("PART_DUPLICATE", "x")
     made.block("INCLUDE_NASTRAN", "x.nas").block("CONTROL_TERMINATION", ("r", 1.0)).block("MAT_ADD_EROSION", ("i", 1))
+    made.block("PART_MODES", ("i", 1)).block("DEFINE_BOX_ADAPTIVE", ("i", 1), ("r", 1.0))
     made.block("ELEMENT_MASS_MATRIX_NODE_SET", ("I", 1)).block("NODE_MERGE", ("i", 1)).block("LOAD_BODY_RX", ("i", 1))
     found = read(made, tmp_path).deck
     text = "\n".join(found.warnings)
@@ -256,6 +257,7 @@ def test_keywords_that_are_not_understood_are_named_with_their_line(tmp_path):
         ("INCLUDE_NASTRAN", "its file is not read"),
         ("ELEMENT_MASS_MATRIX_NODE_SET", "its elements add no mass"),
         ("NODE_MERGE", "is not read"),
+        ("PART_MODES", "its parts are left out"),
         ("LOAD_BODY_RX", "its acceleration is not taken"),
     ):
         assert f"*{name}: is not read; {why}" in text

@@ -65,6 +65,10 @@ EXACT = {  # used without words behind only
     "NODE", "ELEMENT_MASS", "LOAD_BODY_X", "LOAD_BODY_Y", "LOAD_BODY_Z", "INCLUDE", "INCLUDE_TRANSFORM", "INCLUDE_PATH",
     "PARAMETER",
 }  # fmt: skip
+PART_WORDS = {
+    "PART", "INERTIA", "REPOSITION", "CONTACT", "PRINT", "ATTACHMENT", "NODES", "AVERAGED", "FIELD", "COMPOSITE",
+    "LONG", "TSHELL", "TITLE",
+}  # fmt: skip
 EVERY: dict[str, tuple[str, str]] = {
     **{key: ("matters", what) for key, what in MATTERS.items()},
     **{key: ("safe", why) for why, keys in SAFE.items() for key in keys},
@@ -84,4 +88,6 @@ def place(name: str) -> tuple[str, str]:
     if key is None:
         first = name.split("_")[0]
         return ("matters", MATTERS[first]) if first in MATTERS else ("unknown", "")
+    if key == "PART" and set(name.split("_")) - PART_WORDS:
+        return "matters", "its parts are left out"
     return EVERY[key]

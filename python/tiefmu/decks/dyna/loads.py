@@ -114,7 +114,7 @@ class RigidParts:
     def nodal_body(self, block: Block):
         """*CONSTRAINED_NODAL_RIGID_BODY with its options."""
         card, titled = 0, block.has("TITLE")
-        more = block.has("SPC") + 4 * block.has("INERTIA")
+        more = block.has("SPC", "INERTIA", "OVERRIDE")
         while card < block.end:
             title = block.text(card) if titled else ""
             card += titled

@@ -55,8 +55,8 @@ class Sets:
 
     def box(self, block: Block):
         card, step = self.first(block), 2 if block.has("TITLE") else 1
-        if block.has("LOCAL"):
-            return
+        if set(block.words) - {"DEFINE", "BOX", "TITLE"}:
+            return  # boxes in axes of their own, or for other keywords
         while card < block.end:
             number, *sides = block.read(card, "irrrrrr")
             low, high = np.array(sides[::2]), np.array(sides[1::2])
