@@ -73,6 +73,8 @@ def test_includes(tmp_path):
     ]
     found = read("\n".join(main), tmp_path)
     assert len(found.deck.node_id) == 7 and len(found.deck.ties) == 1
+    main[start + 1] = "*INCLUDE, INPUT=parts\\nodes.inc"  # as on Windows
+    assert len(read("\n".join(main), tmp_path).deck.node_id) == 7
     (tmp_path / "ties.inc").write_text("\n".join(lines[end:]).replace("plate", "plat"))
     with pytest.raises(decks.SceneError, match=r"^ties.inc: line 2: \*TIE: there is no surface or set 'plat'$"):
         read("\n".join(main), tmp_path)
@@ -390,8 +392,13 @@ def test_gravity(tmp_path):
     assert found.scene.tables["model"]["gravity"] == pytest.approx([0, 0, -9.81])
     found = read(deck().block("DLOAD, AMPLITUDE=ramp", ", GRAV, 9.81, 0., 0., -1."), tmp_path)
     assert "model" not in found.scene.tables and any("(ramp) and is not taken" in line for line in found.deck.warnings)
-    found = read(deck().block("DLOAD", "plate, GRAV, 9.81, 0., 0., -1."), tmp_path)
-    assert any("acts on 'plate' only" in line for line in found.deck.warnings)
+    made = deck().elements("S3", "flap", {2: (2, 13, 3)}).shell("flap")
+    both = ["plate, GRAV, 9.81, 0., 0., -1.", "flap, Grav, 9.81, 0., 0., -1."]
+    found = read(made.block("DLOAD", *both), tmp_path)  # set by set is once everywhere
+    assert found.scene.tables["model"]["gravity"] == pytest.approx([0, 0, -9.81])
+    assert not any("gravity is" in line for line in found.deck.warnings)
+    found = read(made.block("DLOAD", both[0]), tmp_path)
+    assert any("gravity is not the same everywhere" in line for line in found.deck.warnings)
 
 
 # the whole way

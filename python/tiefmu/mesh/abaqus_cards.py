@@ -164,6 +164,8 @@ class Reader:
         inner = path.parent / wanted
         if not inner.is_file():
             inner = self.folder / wanted  # as a path in Abaqus is one from the folder of the job
+        if not inner.is_file() and "\\" in wanted:
+            inner = path.parent / wanted.replace("\\", "/")
         try:
             if inner.resolve() in (*above, path.resolve()):
                 block.fail(f"{wanted} includes itself")

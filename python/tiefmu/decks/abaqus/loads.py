@@ -195,6 +195,9 @@ def initial(source: Source):
 def gravity(source: Source):
     """*DLOAD of type GRAV without an amplitude, of the model or the first step."""
     deck = source.deck
+    weighing = [part.id for part in deck.parts.values() if deck.properties[part.property].kind != "void"]
+    body = np.isin(source.part_of_row, weighing)
+    field, where = np.zeros((len(body), 3)), ""
     for scope, block in source.cards("DLOAD"):
         for line, items in block.rows():
             if len(items) < 2 or items[1].upper() != "GRAV" or block.step > 1:
@@ -206,11 +209,15 @@ def gravity(source: Source):
             length = np.linalg.norm(direction)
             if not 0 < length < np.inf or not np.isfinite(size):
                 block.fail("gravity has no direction", line)
-            if items[0]:
-                nodes = nodes_of_rows(source, source.rows(scope, items[0], block, line))
-                if len(np.unique(nodes)) < len(deck.node_id):
-                    deck.warn(f"{block.at(line)}: gravity acts on '{items[0]}' only; it is taken for all nodes")
-            deck.gravity = (np.zeros(3) if deck.gravity is None else deck.gravity) + size * np.array(direction) / length
+            rows = source.rows(scope, items[0], block, line) if items[0] else slice(None)
+            field[rows] += size * np.array(direction) / length
+            where = where or block.at(line)
+    if not where:
+        return
+    values, count = np.unique(field[body] if body.any() else field, axis=0, return_counts=True)
+    deck.gravity = values[np.argmax(np.where(values.any(axis=1), count, 0))]
+    if len(values) > 1:
+        deck.warn(f"{where}: gravity is not the same everywhere; {deck.gravity.tolist()} is taken for all nodes")
 
 
 def loaded_slaves(source: Source):
