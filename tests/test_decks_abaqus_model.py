@@ -51,7 +51,7 @@ def test_case_blanks_comments_and_continuations(tmp_path):
     text = text.replace("POSITION TOLERANCE", "\n  PositionTolerance").replace("*ELASTIC", "*Elastic,\n**\n")
     text = text.replace("MATERIAL=steel", 'material = "STEEL"').replace("ELSET=plate", "elset= Plate ")
     text = text.replace("3, 2.0, 1.0, 0.0", " 3 , 2.D0 , 1. ,\n\n**")
-    other = read(text.replace("\n", "\r\n"), tmp_path).scene
+    other = read("\ufeff" + text.replace("\n", "\r\n"), tmp_path).scene
     assert other.tables == plain.tables
     for key, values in plain.columns.items():
         assert np.array_equal(other.columns[key], values), key

@@ -5,6 +5,7 @@ import pytest
 from input_deck import InputDeck
 from tiefmu import decks
 from tiefmu.decks import abaqus
+from tiefmu.decks.shared_slaves import distances
 from tiefmu.report import report
 
 # Two shells side by side (elements 1, 2), a triangle (3), two hexahedra under the shells (10, 11), and pins above.
@@ -274,6 +275,28 @@ def test_ties_are_chosen_by_name_and_pairs_of_one_tie_kept_apart(tmp_path):
     assert [tie.name for tie in raw(made, tmp_path, ["RIGHT"]).ties] == ["right", "right (2)"]
     with pytest.raises(decks.SceneError, match=r"\*TIE: no tie is called 'lef'; did you mean 'Left'"):
         raw(made, tmp_path, ["lef"])
+
+
+def test_a_slave_of_two_ties_stays_with_the_nearer_surface(tmp_path):
+    made = deck({31: (1.0, 0.5, 0.05), 32: (1.5, 0.5, 0.02)}).block("NSET, NSET=a", "21, 31, 32")
+    made.block("NSET, NSET=c", "31, 32, 22").elements("S4R", "high", {77: (41, 42, 43, 44)}).shell("high")
+    made.nodes({41: (1, 0, 0.04), 42: (2, 0, 0.04), 43: (2, 1, 0.04), 44: (1, 1, 0.04)})
+    made.block("ELSET, ELSET=one", "1").tie("a", "one", ", ADJUST=NO, POSITION TOLERANCE=1", "low")
+    made.tie("c", "high", ", ADJUST=NO, POSITION TOLERANCE=1", "high")
+    found = read(made, tmp_path)
+    # 31 is 0.05 above the first and 0.01 above the second; 32 is too far beside the first
+    assert found.scene.node_sets["low slaves"].tolist() == [21]
+    assert found.scene.node_sets["high slaves"].tolist() == [22, 31, 32]
+    assert any("tie 'low': 1 slaves, the first is node 31, are slaves of tie 'high'" in w for w in found.deck.warnings)
+    decks.compiled(found)
+
+
+def test_distances_from_triangles():
+    triangle = np.array([[[0, 0, 0], [2, 0, 0], [0, 2, 0]]], float)
+    points = np.array([[0.5, 0.5, 3], [-3, -4, 0], [2, 2, 1], [1, -2, 0], [3, 0, 0], [0.5, 0.5, 0]])
+    expected = [3, 5, np.sqrt(2 + 1), 2, 1, 0]
+    assert distances(points, triangle) == pytest.approx(expected)
+    assert distances(points, triangle[:, [1, 0, 2]]) == pytest.approx(expected)
 
 
 def test_a_mesh_is_no_deck(tmp_path):

@@ -5,6 +5,8 @@ from collections.abc import Callable
 
 import numpy as np
 
+from ..mesh.fortran_numbers import number
+
 LARGEST_ID = 10**18
 UNDERSCORE = ord("_")
 
@@ -47,19 +49,8 @@ def whole(text: str) -> int:
 
 
 def real(text: str) -> float:
-    """Fortran's numbers: 1.5, 1.D-3, .3, 1.5-3."""
-    if not text:
-        return 0.0
-    text = text.replace("D", "e").replace("d", "e")
-    if "_" in text:
+    """Fortran's numbers: 1.5, 1.D-3, .3, 1.5-3; blank: 0. ValueError for what is none, or not finite."""
+    found = number(text)
+    if not math.isfinite(found):
         raise ValueError
-    try:
-        number = float(text)
-    except ValueError:
-        place = max(text.rfind("+"), text.rfind("-"))
-        if place <= 0 or text[place - 1] in "eE":
-            raise
-        number = float(f"{text[:place]}e{text[place:]}")
-    if not math.isfinite(number):
-        raise ValueError
-    return number
+    return found

@@ -15,6 +15,7 @@ from .._core import SceneError
 from ..units import DIMENSIONS, LENGTHS, MASSES, TIMES
 from .element_properties import Nodal, nodal
 from .model import TURNING, Deck, Faces, Tie
+from .shared_slaves import settle_shared
 from .springs import spring_tables
 from .surfaces import match_rows
 
@@ -43,6 +44,7 @@ def convert(deck: Deck, free: tuple[str, ...] = ()) -> Written:
     n = len(deck.node_id)
     slave, master = np.zeros(n, bool), np.zeros(n, bool)
     pass_over_masters(deck)
+    settle_shared(deck)
     for tie in deck.ties:
         slave[tie.slaves] = True
         master[tie.faces.nodes[tie.faces.nodes >= 0]] = True

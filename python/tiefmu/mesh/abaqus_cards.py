@@ -98,7 +98,7 @@ class Block:
         return self.numbers(line, self.lines[line].rstrip(", \t").split(",")).tolist()
 
     def table(self, columns: int, dtype: type) -> np.ndarray | None:
-        """All data lines at once, as fields.table."""
+        """All data lines at once, as fortran_numbers.table."""
         return table(self.lines, columns, dtype)
 
 

@@ -18,7 +18,11 @@ UNREAD = {
 def read(source: Source) -> dict[str, Material]:
     """Materials by name in capitals, also in deck.materials."""
     deck, found, material = source.deck, {}, None
+    seen: set[int] = set()
     for _, block in source.cards():
+        if id(block) in seen:  # of a part that is placed several times
+            continue
+        seen.add(id(block))
         if block.key == "MATERIAL":
             name = block.need("NAME")
             if name.upper() in found:
