@@ -318,6 +318,22 @@ WRONG = [
         f'{HEAD}[[parameter]]\nscene = "mass"\nvalues = [1]',
         "parameter 'mass': expected TABLE.KEY or TABLE[NUMBER].KEY, as in node[2].mass",
     ),
+    (
+        f'{HEAD}[[parameter]]\nstart = "integrator.safty"\nvalues = [1]',
+        "start 'integrator.safty': no input or parameter of the FMU; did you mean 'integrator.safety'?",
+    ),
+    (
+        f'{HEAD}[run]\ninput = "in.csv"\n[[parameter]]\ninput = "slave[1].f[2]"\nvalues = [1]',
+        "input 'slave[1].f[2]': no column of the input; did you mean 'slave[1].f[3]'?",
+    ),
+    (
+        f'scene = "plate.toml"\nsignals = ["slaves[1].v[3]"]\n{FIRST}values = [1]',
+        "signals: 'slaves[1].v[3]': no such output; did you mean 'slave[1].v[3]'?",
+    ),
+    (
+        f'{HEAD}[[parameter]]\nscene = "node[2].mass"\nvalues = [-1]',
+        "case 0: scene: node table 2: mass: -1 is negative; it must be 0 or more",
+    ),
     (f'scene = "no.toml"\nsignals = ["x"]\n{FIRST}values = [1]', "no.toml: no such file beside it"),
 ]  # fmt: skip
 

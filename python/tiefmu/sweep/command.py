@@ -11,8 +11,7 @@ from typing import Any
 
 from ..acceptance import command as acceptance
 from ..arguments import check_folder_of, whole
-from ..errors import UsageError
-from ..loading import load
+from ..errors import RunError, UsageError
 from ..results import needed
 from ..scene import read_toml
 from . import table, worker
@@ -49,7 +48,7 @@ def run_sweep(options: argparse.Namespace) -> int:
     todo = cases(sweep, name)
     task = shared(sweep, folder, name)
     raw, files = scene_of(sweep, folder)
-    first_variant(raw, sweep, todo, folder, name)
+    first_variant(raw, files, task, sweep, todo, name)
     journal = Journal(
         options.output.with_name(f".{options.output.name}.journal"), digest(task, raw, files, todo), options.resume
     )
@@ -98,15 +97,22 @@ def scene_of(sweep: Sweep, folder: Path) -> tuple[dict | bytes, dict[str, bytes]
     return raw, {file: (path.parent / file).read_bytes() for file in named if (path.parent / file).is_file()}
 
 
-def first_variant(raw: dict | bytes, sweep: Sweep, todo: list[Case], folder: Path, name: str) -> None:
-    """What is wrong with all cases is said before any runs. Raises UsageError, SceneError."""
+def first_variant(raw: dict | bytes, files: dict, task: worker.Task, sweep: Sweep, todo: list[Case], name: str) -> None:
+    """What is wrong with all cases is said before any runs. Raises UsageError."""
+    data: bytes | str
     if isinstance(raw, bytes):
-        return
+        data = raw
+    else:
+        try:
+            data = worker.build_variant(variant(raw, sweep, todo[0].values), files)
+        except UsageError as error:
+            raise UsageError(f"{name}: parameter {error}") from None
+    if isinstance(data, str):
+        raise UsageError(f"{name}: case 0: {data}")
     try:
-        first = variant(raw, sweep, todo[0].values)
-    except UsageError as error:
-        raise UsageError(f"{name}: parameter {error}") from None
-    load(first, folder=(folder / sweep.scene).parent)
+        worker.Ready(data, task).close()
+    except (UsageError, RunError) as error:
+        raise UsageError(f"{name}: {error}") from None
 
 
 def digest(task: worker.Task, raw: dict | bytes, files: dict[str, bytes], todo: list[Case]) -> str:

@@ -16,6 +16,7 @@ from ..fmu_instance import Fmu, Instance
 from ..loading import load
 from ..package import build
 from ..run import experiment, simulate
+from ..schema import suggestion
 from ..signals import Experiment
 
 KEPT = 16  # unpacked FMUs that a thread of a worker holds
@@ -76,7 +77,15 @@ class Ready:
         known = self.fmu.outputs()
         missing = next((name for name in task.signals if name not in known), None)
         if missing:
-            raise UsageError(f"signals: '{missing}': no such output")
+            raise UsageError(f"signals: '{missing}': no such output{suggestion(missing, known)}")
+        for parameter in task.parameters:
+            settable = [v.name for v in self.fmu.description.modelVariables if v.causality in ("input", "parameter")]
+            if parameter.start and parameter.start not in settable:
+                what = f"start '{parameter.start}': no input or parameter of the FMU"
+                raise UsageError(f"{what}{suggestion(parameter.start, settable)}")
+            if parameter.input and parameter.input not in ("*", *plan.inputs.names):
+                what = f"input '{parameter.input}': no column of the input"
+                raise UsageError(f"{what}{suggestion(parameter.input, plan.inputs.names)}")
         self.outputs = [name for name in known if name in wanted]
         if self.judge:
             self.judge.outputs = self.outputs
