@@ -1,4 +1,5 @@
-"""No output is forgotten: each is computed from the rest of the array, whatever its own place held before."""
+"""Simulation in Python: each output is computed from the rest of the array, whatever its own place held before; calls
+that make no sense change nothing."""
 
 import numpy as np
 import pytest
@@ -28,3 +29,22 @@ def test_every_output_is_computed_anew(kind):
         assert np.isfinite(before).all(), field
         simulation.set(field, np.full(before.shape, np.nan))
         np.testing.assert_array_equal(simulation.get(field), before, err_msg=field)
+
+
+def test_calls_that_make_no_sense_change_nothing():
+    simulation, other = (
+        tiefmu.load(SCENES[kind](np.random.default_rng(3))).simulation() for kind in ("driven", "ports")
+    )
+    with pytest.raises(ValueError, match="start time"):
+        simulation.initialise(np.nan)
+    for each in (simulation, other):
+        each.initialise(0.0)
+    before = {field: simulation.get(field) for field in simulation.fields}
+    for duration in (0.0, -1e-3, np.inf, np.nan):
+        with pytest.raises(ValueError, match="duration"):
+            simulation.step(duration)
+    with pytest.raises(ValueError, match="another model"):
+        simulation.restore(other.save())
+    assert simulation.time == 0
+    for field, values in before.items():
+        np.testing.assert_array_equal(simulation.get(field), values, err_msg=field)

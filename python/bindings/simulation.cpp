@@ -6,6 +6,7 @@
 #include <nanobind/stl/string_view.h>
 #include <nanobind/stl/vector.h>
 
+#include <cmath>
 #include <memory>
 #include <unordered_map>
 
@@ -141,11 +142,20 @@ void bindSimulation(nb::module_& m) {
       .def(
           "reset", [](NamedSimulation& r) { r.simulation.reset(); }, "Back to the start values, as constructed.")
       .def(
-          "initialise", [](NamedSimulation& r, double t) { r.simulation.initialise(t); }, "time"_a = 0.0,
-          "Start time, s. Raises SceneError, e.g. for a free node without mass.")
+          "initialise",
+          [](NamedSimulation& r, double t) {
+            require(std::isfinite(t), "the start time is not finite");
+            r.simulation.initialise(t);
+          },
+          "time"_a = 0.0, "Start time, s. Raises SceneError, e.g. for a free node without mass.")
       .def(
-          "step", [](NamedSimulation& r, double h) { r.simulation.step(h); }, "duration"_a,
-          "Forward by `duration` s, in equal substeps within the limit. Raises Diverged.")
+          "step",
+          [](NamedSimulation& r, double h) {
+            require(h > 0 && std::isfinite(h), "a step's duration is a finite number of seconds above 0");
+            r.simulation.step(h);
+          },
+          "duration"_a,
+          "Forward by `duration` s, in equal substeps within the limit. Raises ValueError, Diverged, StepTooLong.")
       .def(
           "update_outputs", [](NamedSimulation& r) { r.simulation.updateOutputs(); },
           "Brings outputs in line with the inputs last set; the getters do it by themselves.")
@@ -164,7 +174,12 @@ void bindSimulation(nb::module_& m) {
              return state;
            })
       .def(
-          "restore", [](NamedSimulation& r, const Simulation::State& state) { r.simulation.restore(state); }, "state"_a)
+          "restore",
+          [](NamedSimulation& r, const Simulation::State& state) {
+            require(state.data.size() == r.simulation.layout().size, "the state is of another model");
+            r.simulation.restore(state);
+          },
+          "state"_a)
       .def_prop_ro("fields", &NamedSimulation::fields, "Names of the model's fields and how many values each has.")
       .def_prop_ro("variables", &NamedSimulation::variables,
                    "The FMU's variables, as a list of blocks in value reference order.")
