@@ -52,7 +52,7 @@ SCENE = {
         "gravity": [0.0, 0.0, -9.81e-3],
     },
     "integrator": {"method": "noh-bathe", "time_step": 1e-3, "safety": 0.5, "threads": 2},
-    "interface": {"expose": ["energy"], "hide": ["drift"]},
+    "interface": {"expose": ["energy"], "hide": ["drift"], "names": "flat"},
 }
 DROPPED = {"w"}  # by a variant without rotations
 CHANGED = {  # what a variant is about, and what the studies set themselves

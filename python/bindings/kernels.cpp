@@ -206,7 +206,8 @@ void bindKernels(nb::module_& parent) {
             wants(positions, 3 * g.nodes, "positions");
             wants(offset, 3 * g.slaves, "offset");
             std::copy_n(offset.data(), offset.size(), g.offset.begin());
-            updateFrames(g.tie, g.all(), positions.data(), g.frames.data());
+            if (kinematicsOf(g.tie.coupling).segmentsTurn)
+              updateFrames(g.tie, g.all(), positions.data(), g.frames.data());
           },
           "positions"_a, "offset"_a, "Node positions (nodes, 3) and offsets d (slaves, 3), m.")
       .def(
