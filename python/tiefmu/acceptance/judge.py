@@ -13,9 +13,8 @@ from ..fmu_instance import Fmu, Instance
 from ..results import Result
 from ..run import experiment, simulate
 from ..signals import Experiment
-from . import health
+from . import health, iso18571
 from .criteria import Against, Band, Criteria, Criterion, Limit, Rating
-from .iso18571 import RATE, ratings
 from .quantities import Collected, Points, Quantity, cut, prepared, reference
 from .verdict import Curve, Verdict
 
@@ -146,11 +145,11 @@ def rating(label: str, row: Rating, unit: str, t: np.ndarray, x: np.ndarray, giv
     """By ISO/TS 18571, at 10 kHz, both linear between their rows."""
     rt, rx = given
     start, end = max(t[0], rt[0]), min(t[-1], rt[-1])
-    count = int(np.floor((end - start) * RATE * (1 + 1e-12))) + 1 if end > start else 0
+    count = int(np.floor((end - start) * iso18571.RATE * (1 + 1e-12))) + 1 if end > start else 0
     if count < 20:
         raise UsageError(f"{row.reference}: shares {max(end - start, 0):g} s with the run; a rating needs 2 ms or more")
-    times = start + np.arange(count) / RATE
-    grades = ratings(times, np.interp(times, rt, rx), np.interp(times, t, x), row.name or label)
+    times = start + np.arange(count) / iso18571.RATE
+    grades = iso18571.ratings(times, np.interp(times, rt, rx), np.interp(times, t, x), row.name or label)
     return Verdict(
         label,
         "rating",
