@@ -2,7 +2,9 @@
 // (bytes per slave and cycle that must move, and the GB/s that a triad moves; or 0).
 //
 //   tiefmu_bench kernels CASE N [shuffled] [THREADS]   cycles at N slaves: loads to masters, accelerations, velocities,
-//                                  slave motion. CASE: default, default-rotations, optimized, or these with -consistent
+//                                  slave motion. CASE: default, default-rotations or optimized, then in this order
+//                                  -welds1, -welds4 (quads apart from each other with so many slaves; else a surface
+//                                  of quads with four each), -light (slaves a quarter as heavy), -consistent
 //   tiefmu_bench cycles CASE N COUNT   that many cycles and no timing, for instruction counts
 //   tiefmu_bench memory CASE N     bytes per slave of an FMU's simulation, its model included
 //   tiefmu_bench search N [shuffled]   both searches of N slaves on N/4 segments
@@ -43,9 +45,17 @@ double triad() {
 // What is computed: a formulation ("default", "default-rotations", "optimized"), with lumped or consistent inertia.
 struct Case {
   std::string name, coupling;
-  bool consistent;
-  explicit Case(const std::string& text)
-      : name(text), coupling(text.substr(0, text.find("-consistent"))), consistent(coupling != text) {
+  bool consistent, light;
+  int welds = 0;  // slaves of each quad that stands apart; 0: a surface
+  bool take(const char* ending) {
+    if (!coupling.ends_with(ending)) return false;
+    coupling.resize(coupling.size() - std::strlen(ending));
+    return true;
+  }
+  explicit Case(const std::string& text) : name(text), coupling(text) {
+    consistent = take("-consistent");
+    light = take("-light");
+    welds = take("-welds1") ? 1 : take("-welds4") ? 4 : 0;
     if (coupling == "default" || coupling == "default-rotations" || coupling == "optimized") return;
     std::fprintf(stderr, "unknown case '%s'\n", text.c_str());
     std::exit(2);
@@ -56,42 +66,55 @@ struct Case {
 // cycle moves everything.
 Scene surface(const Case& what, int slaves, bool shuffled, int threads = 1) {
   Scene scene;
-  const int side = std::max(1, static_cast<int>(std::lround(std::sqrt(slaves / 4.0))));
-  const auto add = [&](const Vec3& x, Motion motion) {
+  const int each = what.welds ? what.welds : std::min(4, slaves);
+  const int side = std::max(1, static_cast<int>(std::lround(std::sqrt(slaves / (what.welds ? each : 4.0)))));
+  const auto add = [&](const Vec3& x, Motion motion, double mass = 1) {
     SceneNodes& n = scene.nodes;
     n.id.push_back(static_cast<std::int64_t>(n.id.size()) + 1);
     n.position.push_back(x);
     n.motion.push_back(motion);
     n.rotations.push_back(what.coupling == "default-rotations");
-    n.mass.push_back(1.0);
-    n.inertia.push_back(what.coupling == "default" ? 0.0 : 0.1);
+    n.mass.push_back(mass);
+    n.inertia.push_back(what.coupling == "default" ? 0.0 : 0.1 * mass);
     n.stiffness.push_back(0);
     n.rotationalStiffness.push_back(0);
     n.velocity.push_back(Vec3(0.1, 0.2, 0.3));
     n.spin.push_back(Vec3(0.1, 0.2, 0.3));
     return static_cast<int>(n.id.size()) - 1;
   };
-  for (int j = 0; j <= side; ++j)
-    for (int i = 0; i <= side; ++i) add(Vec3(i, j, 0.1 * ((i + j) % 2)), Motion::free);
+  const auto corner = [&](int i, int j) { return Vec3(i, j, 0.1 * ((i + j) % 2)); };
+  if (!what.welds)
+    for (int j = 0; j <= side; ++j)
+      for (int i = 0; i <= side; ++i) add(corner(i, j), Motion::free);
   SceneTie tie;
   tie.name = "surface";
   tie.formulation = what.coupling == "optimized" ? Formulation::optimized : Formulation::standard;
   const double offset = what.coupling == "default" ? 0.0 : 0.3;
   std::vector<Vec3> places;
-  for (int j = 0; j < side; ++j)
-    for (int i = 0; i < side; ++i) {
+  int quads = what.welds ? std::max(1, slaves / each) : side * side;
+  for (int j = 0; quads > 0; ++j)
+    for (int i = 0; i < side && quads > 0; ++i, --quads) {
       const int a = j * (side + 1) + i;
       tie.segments.push_back(static_cast<int>(scene.segments.id.size()));
       scene.segments.id.push_back(static_cast<std::int64_t>(scene.segments.id.size()) + 1);
-      scene.segments.nodes.push_back({a, a + 1, a + side + 2, a + side + 1});
-      for (int k = 0; k < std::min(4, slaves); ++k)
+      if (what.welds) {
+        const int b = add(corner(i, j), Motion::free);
+        add(corner(i + 1, j), Motion::free);
+        add(corner(i + 1, j + 1), Motion::free);
+        add(corner(i, j + 1), Motion::free);
+        scene.segments.nodes.push_back({b, b + 1, b + 2, b + 3});
+      } else {
+        scene.segments.nodes.push_back({a, a + 1, a + side + 2, a + side + 1});
+      }
+      for (int k = 0; k < each; ++k)
         places.push_back(Vec3(i + 0.3 + 0.4 * (k % 2), j + 0.3 + 0.4 * (k / 2), 0.05 + offset));
     }
   if (shuffled) bench::shuffle(places);
-  for (const Vec3& x : places) tie.slaves.push_back(add(x, Motion::driven));
+  for (const Vec3& x : places) tie.slaves.push_back(add(x, Motion::driven, what.light ? 0.25 : 1));
   scene.ties.push_back(tie);
   scene.settings.timeStep = 1e-6;
   scene.settings.safety = 0.9;
+  scene.settings.solverTolerance = 1e-4;
   scene.settings.threads = threads;
   if (what.consistent) scene.settings.inertia = Inertia::consistent;
   return scene;
@@ -100,7 +123,7 @@ Scene surface(const Case& what, int slaves, bool shuffled, int threads = 1) {
 // Bytes per slave and cycle that must move between memory and core when nothing stays in the caches: each array once
 // per pass over it, masters spread over the four slaves of a quad. 0 for consistent inertia, which iterates.
 double bytesMoved(const Case& what) {
-  if (what.consistent) return 0;
+  if (what.consistent || what.welds) return 0;
   // Loads pass: F (24), Phi (32); motion pass: Phi (32), v_s (24 written).
   // Masters, one per four slaves: indices twice (32), v three times with its kick (96), f (48), f_ext (24), a (96),
   // mass (16).

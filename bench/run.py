@@ -23,6 +23,8 @@ LATEST, REFERENCE, CHART = HERE / "latest.csv", HERE / "instructions.csv", ROOT 
 COLUMNS = ["case", "n", "threads", "value", "unit", "bytes", "triad_gb_s"]
 FORMULATIONS = ["default", "default-rotations", "optimized"]
 CONSISTENT = [f"{name}-consistent" for name in FORMULATIONS]
+# Quads apart from each other, with one and with four slaves, and a surface whose slaves are a quarter as heavy.
+OTHERS = [f"{name}-{kind}" for kind in ("welds1", "welds4", "light") for name in FORMULATIONS]
 SLAVES = [1, 4, 16, 100, 1_000, 10_000, 100_000, 1_000_000]
 THREADS = [1, 2]
 COUNTED = 1024  # slaves of the instruction counts: in the caches, and the rest of the program small beside them
@@ -67,7 +69,21 @@ def cycles(bench: Path, slaves: list[int]) -> list[list[str]]:
         if n >= 10_000:
             for case in FORMULATIONS:
                 rows += run(bench, "kernels", case, n, "shuffled", 1)
+        if n in (1, 100, 10_000):
+            for case in OTHERS:
+                rows += run(bench, "kernels", case, n, 1) + run(bench, "kernels", f"{case}-consistent", n, 1)
     return rows
+
+
+def ratios(rows: list[list[str]]) -> str:
+    """What consistent inertia costs beside lumped, in the same run."""
+    cost = {(case, int(n), int(threads)): float(value) for case, n, threads, value, *_ in rows}
+    lines = [f"{'consistent to lumped':32}{'n':>9}{'threads':>9}{'ratio':>12}"]
+    for (case, n, threads), value in cost.items():
+        lumped = cost.get((case.removesuffix("-consistent"), n, threads))
+        if case.endswith("-consistent") and lumped:
+            lines.append(f"{case.removesuffix('-consistent'):32}{n:>9}{threads:>9}{value / lumped:>12.2f}")
+    return "\n".join(lines)
 
 
 def growth(bench: Path) -> list[list[str]]:
@@ -240,7 +256,8 @@ def main() -> None:
         print("\n".join(f"{case:32}{count:10.1f} instructions per slave and cycle" for case, count in counts.items()))
         return
     if options.n:
-        print(table(cycles(bench, [int(n) for n in options.n])))
+        rows = cycles(bench, [int(n) for n in options.n])
+        print(table(rows) + "\n\n" + ratios(rows))
         return
     rows = cycles(bench, SLAVES) + growth(bench) + calls(bench)
     rows += [
@@ -251,7 +268,7 @@ def main() -> None:
         file.writelines(f"# {line}\n" for line in made)
         csv.writer(file, lineterminator="\n").writerows([COLUMNS, *rows])
     chart(rows, made)
-    print("\n".join(made) + "\n" + table(rows))
+    print("\n".join(made) + "\n" + table(rows) + "\n\n" + ratios(rows))
     print(f"written to {LATEST} and {CHART}")
 
 

@@ -122,8 +122,8 @@ template <class Archive> void field(Archive& a, Spring& spring) {
 }
 
 template <class Archive> void field(Archive& a, TieGroup& group) {
-  auto& [coupling, corners, firstSlave, node, begin, weight, partEnd] = group;
-  fields(a, coupling, corners, firstSlave, node, begin, weight, partEnd);
+  auto& [coupling, corners, firstSlave, node, begin, weight, partEnd, phaseEnd] = group;
+  fields(a, coupling, corners, firstSlave, node, begin, weight, partEnd, phaseEnd);
 }
 
 template <class Archive> void field(Archive& a, Port& port) {
@@ -181,6 +181,7 @@ void checkSettings(const Settings& s) {
   };
   std::apply([&](const auto&... m) { (check(m), ...); }, settingsMembers);
   require(s.threads >= 0 && s.threads <= mostThreads, "threads");
+  require(s.solverTolerance > 0 && s.solverTolerance < 1, "solver tolerance");
 }
 
 void checkNodes(const Model& m) {
@@ -231,8 +232,11 @@ void checkGroups(const Model& m) {
     requireSize(g.weight, corners * slaves, "weights");
     requireFinite(g.weight, "weights that are not finite");
     require(!g.partEnd.empty() && std::is_sorted(g.partEnd.begin(), g.partEnd.end()) && g.partEnd.front() >= 0 &&
-                g.partEnd.back() <= g.segments(),
+                g.partEnd.back() == g.segments(),
             "parts");
+    require(!g.phaseEnd.empty() && std::is_sorted(g.phaseEnd.begin(), g.phaseEnd.end()) && g.phaseEnd.front() >= 0 &&
+                static_cast<std::size_t>(g.phaseEnd.back()) == g.partEnd.size(),
+            "phases");
     const int nodes = kinematicsOf(g.coupling).mastersTurn ? m.rotating() : m.nodes();
     for (int node : g.node) require(node >= 0 && node < nodes, "corners of segments");
     next += slaves;

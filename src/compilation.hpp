@@ -8,6 +8,7 @@
 
 #include "bind.hpp"
 #include "model.hpp"
+#include "partition.hpp"
 #include "scene_view.hpp"
 
 namespace tiefmu {
@@ -38,9 +39,9 @@ class Compilation : SceneView {
   // compile_slaves.cpp
   void placeSlaves();
   void sortBonds();
-  std::vector<int> slaveIndex;             // per scene node: index in the model, or -1
-  std::vector<int> segmentRotation;        // per slave of the model: index of its meanMotion segment, or -1
-  std::vector<std::vector<int>> partEnds;  // per group
+  std::vector<int> slaveIndex;       // per scene node: index in the model, or -1
+  std::vector<int> segmentRotation;  // per slave of the model: index of its meanMotion segment, or -1
+  std::vector<Partition> parts;      // per group
   int meanMotionSegments = 0;
 
   // compile_springs.cpp

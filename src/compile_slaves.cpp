@@ -45,11 +45,11 @@ void Compilation::sortBonds() {
         for (int i = 0; i < b.corners; ++i) node.push_back(nodeIndex[scene.segments.nodes[b.segment][i]]);
       segmentOf.push_back(static_cast<int>(node.size()) / b.corners - 1);
     }
-    const Partition parts = partition(node, bonds[first].corners);
-    std::vector<int> place(parts.order.size());
-    for (int k = 0; k < static_cast<int>(place.size()); ++k) place[parts.order[k]] = k;
+    const Partition found = partition(node, bonds[first].corners);
+    std::vector<int> place(found.order.size());
+    for (int k = 0; k < static_cast<int>(place.size()); ++k) place[found.order[k]] = k;
     for (int k = first; k < last; ++k) rank[k] = place[segmentOf[k - first]];
-    partEnds.push_back(parts.end);
+    parts.push_back(found);
   }
   sort(rank);
 }
@@ -75,7 +75,8 @@ void Compilation::placeSlaves() {
     const Bond& b = bonds[s];
     if (model.groups.empty() || model.groups.back().coupling != b.coupling ||
         model.groups.back().corners != b.corners) {
-      model.groups.push_back({b.coupling, b.corners, s, {}, {0}, {}, partEnds[model.groups.size()]});
+      model.groups.push_back(
+          {b.coupling, b.corners, s, {}, {0}, {}, parts[model.groups.size()].end, parts[model.groups.size()].phaseEnd});
       lastSegment = -1;
     }
     TieGroup& group = model.groups.back();

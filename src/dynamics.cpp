@@ -46,7 +46,12 @@ Dynamics::Dynamics(const Model& m, const Layout& l, double* d)
     right_.resize(3 * n);
     rightMoment_.resize(3 * r);
   }
-  if (consistent && model.anyFree()) inertia_ = ConsistentInertia::of(model);
+  if (consistent && model.anyFree()) {
+    islands_ = std::make_unique<Islands>(model);
+    inertia_ = ConsistentInertia::of(model, islands_->alone().rest);
+    sumsReactions_ =
+        !islands_->alone().allFree || has(Field::powerResidual) || model.settings.reaction != Reaction::loads;
+  }
 }
 
 void Dynamics::setStart() {
@@ -89,7 +94,10 @@ void Dynamics::prepare() {
 void Dynamics::prepareMass() {
   if (!model.finite()) ties.updateFramesAtStart();
   ties.updateGeometry();
-  if (inertia_) updateInertia();
+  if (islands_) islands_->update(field(Field::slaveMass), field(Field::slaveInertia));
+  if (!inertia_) return;
+  inertia_->prepare(field(Field::slaveMass), field(Field::slaveInertia));
+  updateInertia();
 }
 
 void Dynamics::updateMass() {
@@ -97,20 +105,43 @@ void Dynamics::updateMass() {
 }
 
 void Dynamics::updateInertia() {
-  inertia_->update(model.nodeMass.data(), model.nodeInertia.data(), field(Field::slaveMass), field(Field::slaveInertia),
-                   field(Field::offset), ties.frames());
+  inertia_->update(
+      {ties, field(Field::slaveMass), field(Field::slaveInertia), field(Field::offset), segmentRotations()});
 }
 
+// Of the nodes and segments that are factored; the others tell it when they are solved.
 void Dynamics::updateTurnRate(const double* v, const double* w) {
+  if (!inertia_ || has(Field::guess)) return;
   double rate2 = turnRate_ * turnRate_;
-  for (int i = model.freeBegin(); i < model.rotating(); ++i) rate2 = std::max(rate2, at(w, i).squaredNorm());
-  turnRate_ = std::sqrt(std::max(rate2, ties.largestSpin2(v)));
+  for (int i : islands_->alone().rest) {
+    const int node = model.freeBegin() + i;
+    if (node < model.rotating()) rate2 = std::max(rate2, at(w, node).squaredNorm());
+  }
+  turnRate_ = std::sqrt(std::max(rate2, ties.largestSpin2(v, islands_->alone().held)));
 }
 
-void Dynamics::evaluateLoads() {
+void Dynamics::gatherLoads() {
   loads.gather(velocityFor(Field::lagged), spinFor(Field::lagged));
   turnRate_ = std::sqrt(springs.largestTurnRate2());
   if (hasBias()) updateTurnRate(velocityFor(Field::predicted), spinFor(Field::predicted));
+}
+
+void Dynamics::evaluateLoads() {
+  gatherLoads();
+  if (sumsReactions_) sumReactions();
+  if (!hasBias()) return;
+  // How fast the others turn shows where they are solved.
+  std::copy_n(field(Field::acceleration), right_.size(), right_.begin());
+  std::copy_n(field(Field::angularAcceleration), rightMoment_.size(), rightMoment_.begin());
+  solveIslands(right_.data(), rightMoment_.data());
+  if (has(Field::guess)) leaveLoads();
+}
+
+void Dynamics::bringReactions() {
+  if (!sumsReactions_) sumReactions();
+}
+
+void Dynamics::sumReactions() {
   const auto clear = [&](double* value, std::size_t count) {
     ties.eachBlock(count, [&](std::size_t first, std::size_t last) { std::fill(value + first, value + last, 0.0); });
   };
@@ -123,19 +154,49 @@ void Dynamics::updateSlaveAccelerations(const double* a, const double* z, const 
   ties.mapAccelerations(a, z, v, w, as_.data(), zs_.data());
 }
 
+// In place of the slaves' accelerations the loads less what these take.
+void Dynamics::turnIntoLoads(const double* force, const double* moment) {
+  const auto turn = [&](int slaves, const double* load, const double* inertia, double* value) {
+    ties.eachBlock(slaves, [&](std::size_t first, std::size_t last) {
+      for (std::size_t s = first; s < last; ++s) at(value, s) = at(load, s) - inertia[s] * at(value, s);
+    });
+  };
+  turn(model.slaves(), force, field(Field::slaveMass), as_.data());
+  turn(model.turning(), moment, field(Field::slaveInertia), zs_.data());
+}
+
 void Dynamics::turnIntoInertialLoads(double* as, double* zs) {
   const double *mass = field(Field::slaveMass), *inertia = field(Field::slaveInertia);
   for (int s = 0; s < model.slaves(); ++s) at(as, s) *= -mass[s];
   for (int s = 0; s < model.turning(); ++s) at(zs, s) *= -inertia[s];
 }
 
+SegmentLoads Dynamics::loadsOnSegments() {
+  return {loads.nodeForce(),
+          loads.nodeMoment(),
+          loads.slaveForce(),
+          loads.slaveMoment(),
+          field(Field::slaveMass),
+          field(Field::slaveInertia),
+          ties.hasBias() ? velocityFor(Field::predicted) : nullptr,
+          spinFor(Field::predicted),
+          segmentRotations(),
+          knownAccelerations_};
+}
+
+void Dynamics::solveIslands(double* a, double* z) {
+  const double rate2 = islands_->solve(ties, loadsOnSegments(), a, z);
+  turnRate_ = std::max(turnRate_, std::sqrt(rate2));
+}
+
 void Dynamics::evaluate() {
   ++evaluations;
-  evaluateLoads();
+  gatherLoads();
+  if (sumsReactions_) sumReactions();
   const int first = model.freeBegin(), last = model.freeEnd(), turning = model.rotating();
   const double *f = tieForce_, *t = tieMoment_;
   double *a = field(Field::acceleration), *z = field(Field::angularAcceleration);
-  if (!inertia_) {
+  if (!islands_) {
     const double *mass = field(Field::addedMass), *inertia = field(Field::addedInertia);
     ties.eachBlock(last - first, [&](std::size_t i, std::size_t end) {
       i += first;
@@ -149,22 +210,52 @@ void Dynamics::evaluate() {
     });
     return;
   }
+  solveIslands(a, z);
+  if (!inertia_) return;
   updateMass();
-  std::copy_n(f, right_.size(), right_.begin());
-  std::copy_n(t, rightMoment_.size(), rightMoment_.begin());
-  if (ties.hasBias() || knownAccelerations_) {
-    // What is known of the slaves' acceleration: that of the driven masters, and the bias.
-    std::copy_n(a, step_.size(), step_.begin());
-    std::copy_n(z, stepSpin_.size(), stepSpin_.begin());
-    std::fill(step_.begin() + 3 * first, step_.begin() + 3 * last, 0.0);
-    std::fill(stepSpin_.begin() + 3 * first, stepSpin_.end(), 0.0);
-    updateSlaveAccelerations(step_.data(), stepSpin_.data(), velocityFor(Field::predicted), spinFor(Field::predicted));
-    turnIntoInertialLoads();
-    ties.distributeLoads(as_.data(), zs_.data(), right_.data(), rightMoment_.data());
+  // Where an iteration starts; else the free nodes' accelerations count as zero for now.
+  const bool guessed = has(Field::guess) && within(layout[Field::guess].count, field(Field::guess), 1e100);
+  for (int i : islands_->alone().rest) {
+    at(a, first + i) = guessed ? Vec3(at(field(Field::guess), i)) : Vec3(0, 0, 0);
+    if (first + i >= turning) continue;
+    at(z, first + i) = guessed ? Vec3(at(field(Field::guess), model.free() + i)) : Vec3(0, 0, 0);
   }
-  for (int i = 3 * first; i < 3 * last; ++i) right_[i] += loads.nodeForce()[i];
-  for (int i = 3 * first; i < 3 * turning; ++i) rightMoment_[i] += loads.nodeMoment()[i];
-  inertia_->solve(right_.data() + 3 * first, rightMoment_.data() + 3 * first, a + 3 * first, z + 3 * first);
+  if (has(Field::guess)) {
+    leaveLoads();
+    inertia_->finish(ties, model.settings.solverTolerance, a, z);
+    return;
+  }
+  const double *fs = loads.slaveForce(), *ts = loads.slaveMoment();
+  if (ties.hasBias() || knownAccelerations_) {
+    updateSlaveAccelerations(a, z, velocityFor(Field::predicted), spinFor(Field::predicted));
+    turnIntoLoads(fs, ts);
+    fs = as_.data();
+    ts = zs_.data();
+  }
+  std::copy_n(loads.nodeForce(), right_.size(), right_.begin());
+  std::copy_n(loads.nodeMoment(), rightMoment_.size(), rightMoment_.begin());
+  ties.distributeLoads(fs, ts, right_.data(), rightMoment_.data());
+  inertia_->solve(ties, model.settings.solverTolerance, right_.data(), rightMoment_.data(), a, z);
+}
+
+void Dynamics::leaveLoads() {
+  const double rate2 = inertia_->leave(ties, loadsOnSegments(), field(Field::offset), field(Field::acceleration),
+                                       field(Field::angularAcceleration));
+  turnRate_ = std::max(turnRate_, std::sqrt(rate2));
+}
+
+void Dynamics::guessAccelerations(bool extrapolate) {
+  if (!has(Field::guess)) return;
+  const int first = 3 * model.freeBegin(), free = 3 * model.free(), turning = 3 * model.rotating() - first;
+  double *guess = field(Field::guess), *earlier = field(Field::earlier);
+  const auto take = [&](const double* now, int begin, int count) {
+    for (int i = 0; i < count; ++i) {
+      guess[begin + i] = extrapolate ? 2 * now[i] - earlier[begin + i] : now[i];
+      earlier[begin + i] = now[i];
+    }
+  };
+  take(field(Field::acceleration) + first, 0, free);
+  take(field(Field::angularAcceleration) + first, free, turning);
 }
 
 void Dynamics::setForceVelocities(double aheadOfLagged, double aheadOfPredicted) {
@@ -194,7 +285,17 @@ void Dynamics::takeDrivenVelocities() {
 
 void Dynamics::solveInertia(const double* f, const double* t, double* a, double* z) {
   const int first = model.freeBegin(), last = model.freeEnd(), turning = model.rotating();
-  if (inertia_) return inertia_->solve(f + 3 * first, t + 3 * first, a + 3 * first, z + 3 * first);
+  if (islands_) {
+    SegmentLoads onSegments = loadsOnSegments();
+    onSegments.nodeForce = f;
+    onSegments.nodeMoment = t;
+    onSegments.slaveForce = onSegments.slaveMoment = onSegments.velocity = nullptr;
+    onSegments.known = false;
+    islands_->solve(ties, onSegments, a, z);
+    constexpr double tolerance = 1e-12;  // of limits and derivatives
+    if (inertia_) inertia_->solve(ties, tolerance, f, t, a, z);
+    return;
+  }
   for (int i = first; i < last; ++i) at(a, i) = at(f, i) / (model.nodeMass[i] + field(Field::addedMass)[i]);
   for (int i = first; i < turning; ++i) at(z, i) = at(t, i) / (model.nodeInertia[i] + field(Field::addedInertia)[i]);
 }

@@ -6,6 +6,7 @@
 
 #include "attached_slaves.hpp"
 #include "inertia.hpp"
+#include "inertia_islands.hpp"
 #include "input_curve.hpp"
 #include "layout.hpp"
 #include "loads.hpp"
@@ -42,8 +43,9 @@ class Dynamics {
   // Loads at the present geometry with `lagged` velocities in the dampers, what of them the tie passes on to the nodes,
   // and the free nodes' accelerations, with `predicted` velocities in the bias.
   void evaluate();
-  void evaluateLoads();  // the same without the accelerations
-  void updateMass();     // the mass matrix at the present geometry, as `evaluate` does. Throws SceneError
+  void evaluateLoads();   // the same without the accelerations
+  void bringReactions();  // tieForce where `evaluate` needs no such sums and leaves them out
+  void updateMass();      // the mass matrix at the present geometry, as `evaluate` does. Throws SceneError
   // T^T f_s of the last evaluation: N, 3 per node, and N m, 3 per rotating node.
   const double* tieForce() const { return tieForce_; }
   const double* tieMoment() const { return tieMoment_; }
@@ -54,15 +56,19 @@ class Dynamics {
   void turnIntoInertialLoads(double* as, double* zs);  // the same with any such arrays
   std::vector<double>& slaveAcceleration() { return as_; }
   std::vector<double>& slaveAngularAcceleration() { return zs_; }
-  // M^-1 of the free nodes, on node arrays: loads f, t to accelerations a, z, which hold a guess on entry.
+  // M^-1 of the free nodes, on node arrays: loads f, t to accelerations a, z.
   void solveInertia(const double* f, const double* t, double* a, double* z);
   // How fast the geometry of the last `evaluate` turns, rad/s: springs and what holds them (which changes the
   // stiffness), and with consistent inertia every tie (whose bias is explicit).
   double turnRate() const { return turnRate_; }
-  bool hasBias() const { return ties.hasBias() && inertia_; }
+  bool hasBias() const { return ties.hasBias() && islands_; }
   // Velocities (3 per node) and spins (3 per rotating node) that the dampers and the bias see.
   const double* velocityFor(Field f) { return has(f) ? field(f) : field(Field::velocity); }
   const double* spinFor(Field f) { return has(f) ? field(f) + 3 * model.nodes() : field(Field::spin); }
+  // Where the next solution for the accelerations starts, from the present ones and those at the last such call, one
+  // substep before: with these two a straight line's next point, or the present ones. What was evaluated in between
+  // does not count, so that the answer to new inputs does not depend on those tried before.
+  void guessAccelerations(bool extrapolate);
   // Sets `lagged` and `predicted`, where this model has them, from velocity and spin plus so many seconds of the
   // accelerations.
   void setForceVelocities(double aheadOfLagged, double aheadOfPredicted);
@@ -95,6 +101,15 @@ class Dynamics {
   std::int64_t evaluations = 0;
 
  private:
+  void gatherLoads();
+  void sumReactions();
+  SegmentLoads loadsOnSegments();
+  const double* segmentRotations() {
+    return model.finite() && has(Field::segmentRotation) ? field(Field::segmentRotation) : nullptr;
+  }
+  void turnIntoLoads(const double* force, const double* moment);
+  void solveIslands(double* a, double* z);
+  void leaveLoads();
   void updateInertia();
   void updateTurnRate(const double* v, const double* w);
   void advance(std::size_t count, double h, const double* rate, double* value);
@@ -106,8 +121,9 @@ class Dynamics {
   std::vector<double> right_, rightMoment_;                 // right side of the mass matrix
   std::vector<double> step_, stepSpin_;                     // velocities of a drift
   double turnRate_ = 0;
-  bool knownAccelerations_ = false, positionsIntegrated_ = true;
-  std::unique_ptr<ConsistentInertia> inertia_;
+  bool knownAccelerations_ = false, positionsIntegrated_ = true, sumsReactions_ = true;
+  std::unique_ptr<Islands> islands_;            // consistent inertia: segments by themselves,
+  std::unique_ptr<ConsistentInertia> inertia_;  // and the rest; null: nothing is left
 };
 
 }  // namespace tiefmu

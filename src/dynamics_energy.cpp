@@ -1,4 +1,4 @@
-// Energy, and the power that changes it (theory (4.7)).
+// Energy, and the power that changes it (theory (4.10)).
 #include <algorithm>
 
 #include "dynamics.hpp"

@@ -46,6 +46,8 @@ enum class Field : std::uint8_t {
   work,
   lagged,
   predicted,
+  earlier,
+  guess,
   mode,
   highestFrequency,
   dampingRate,
@@ -114,6 +116,7 @@ enum class When : std::uint8_t {
   finite,              // finite displacements
   damped,              // free nodes with dampers
   biased,              // free nodes whose accelerations depend on their velocities
+  iterated,            // free nodes whose accelerations an iteration finds
   modeKept,            // free nodes on springs that turn
   exposed,             // interface.expose names it
 };
@@ -172,6 +175,10 @@ inline constexpr FieldRow fieldRows[] = {
      When::damped},  // that the last damping forces used
     {Field::predicted, "predicted_velocity", "m/s, rad/s", 3, Per::nodeThenRotatingNode, Role::state,
      When::biased},  // that the last bias used
+    {Field::earlier, "earlier_acceleration", "m/s2, rad/s2", 3, Per::freeNodeThenRotatingNode, Role::state,
+     When::iterated},  // one substep before the last
+    {Field::guess, "acceleration_guess", "m/s2, rad/s2", 3, Per::freeNodeThenRotatingNode, Role::state,
+     When::iterated},  // where the solution for the next accelerations starts
     {Field::mode, "mode", "1", 3, Per::freeNodeThenRotatingNode, Role::state, When::modeKept},  // of highestFrequency
     {Field::highestFrequency, "highest_frequency", "rad/s", 1, Per::simulation, Role::state},   // a bound
     {Field::dampingRate, "damping_rate", "1/s", 1, Per::simulation, Role::state},               // bound of M^-1 C

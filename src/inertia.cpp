@@ -11,7 +11,7 @@ namespace tiefmu {
 namespace {
 
 // Up to this many unknowns (3-vectors) a fresh factor at every geometry costs little, and is exact to rounding.
-constexpr int smallSystem = 40;
+constexpr std::size_t smallSystem = 40;
 
 // Calls body(group, segment, slave (global), local slave) in order.
 template <class Body> void eachSlave(const Model& model, Body body) {
@@ -112,24 +112,57 @@ void nodalStiffness(const Model& model, double* translation, double* rotation) {
   });
 }
 
-ConsistentInertia::ConsistentInertia(const Model& model)
-    : model_(model), free_(model.free()), freeRotating_(model.rotating() - model.freeBegin()) {
-  const bool shapes = std::any_of(model.groups.begin(), model.groups.end(),
-                                  [](const TieGroup& g) { return g.coupling == Coupling::meanMotion; });
-  const bool offsets = std::any_of(model.slaveOffset.begin(), model.slaveOffset.begin() + 3 * model.turning(),
-                                   [](double d) { return d != 0; });
-  constant_ = !model.finite() || model.turning() == 0 || (!shapes && !offsets);
+SlaveBody slaveBody(const Model& model, const TieGroup& group, int segment, const double* slaveMass,
+                    const double* slaveInertia) {
+  SlaveBody body{0, Vec3::Zero(), {}};
+  for (int s = group.firstSlave + group.begin[segment]; s < group.firstSlave + group.begin[segment + 1]; ++s) {
+    const Vec3 d = at(model.slaveOffset.data(), s);
+    const Mat3 inertia = slaveMass[s] * unitInertia(d) + slaveInertia[s] * Mat3::Identity();
+    body.mass += slaveMass[s];
+    body.moment += slaveMass[s] * d;
+    int k = 0;
+    for (int i = 0; i < 3; ++i)
+      for (int j = i; j < 3; ++j) body.inertia[k++] += inertia(i, j);
+  }
+  return body;
 }
 
-void ConsistentInertia::refuse(int freeNode, bool turn) const {
-  throw SceneError("node " + std::to_string(model_.nodeId[model_.freeBegin() + freeNode]) + ": is free but has no " +
-                   (turn ? "inertia" : "mass") +
+ConsistentInertia::ConsistentInertia(const Model& model, const std::vector<int>& nodes)
+    : model_(model), node_(nodes), number_(model.free(), -1), free_(static_cast<int>(nodes.size())) {
+  for (int k = 0; k < free_; ++k) number_[node_[k]] = k;
+  const int rotating = model.rotating() - model.freeBegin();
+  freeRotating_ = static_cast<int>(std::lower_bound(node_.begin(), node_.end(), rotating) - node_.begin());
+  turning_ = meanMotion_ = false;
+  bool offsets = false;
+  for (const TieGroup& group : model.groups)
+    for (int e = 0; e < group.segments(); ++e) {
+      const int* corner = &group.node[static_cast<std::size_t>(group.corners) * e];
+      if (std::none_of(corner, corner + group.corners, [&](int node) { return numberOf(node) >= 0; })) continue;
+      turning_ |= group.coupling != Coupling::translation;
+      meanMotion_ |= group.coupling == Coupling::meanMotion;
+      if (group.coupling == Coupling::translation) continue;
+      for (int k = 3 * (group.firstSlave + group.begin[e]); k < 3 * (group.firstSlave + group.begin[e + 1]); ++k)
+        offsets |= model.slaveOffset[k] != 0;
+    }
+  constant_ = !model.finite() || !turning_ || (!meanMotion_ && !offsets);
+}
+
+void ConsistentInertia::refuse(int number, bool turn) const {
+  throw SceneError("node " + std::to_string(model_.nodeId[model_.freeBegin() + node_[number]]) +
+                   ": is free but has no " + (turn ? "inertia" : "mass") +
                    " of its own, and the slaves tied to it do not give it enough for a consistent mass matrix");
 }
 
-std::unique_ptr<ConsistentInertia> ConsistentInertia::of(const Model& model) {
-  const int unknowns = model.free() + model.rotating() - model.freeBegin();
-  return model.turning() == 0 || unknowns <= smallSystem ? directInertia(model) : iterativeInertia(model);
+std::unique_ptr<ConsistentInertia> ConsistentInertia::of(const Model& model, const std::vector<int>& nodes) {
+  if (nodes.empty()) return nullptr;
+  return iterates(model, nodes) ? iterativeInertia(model, nodes) : directInertia(model, nodes);
+}
+
+bool ConsistentInertia::iterates(const Model& model, const std::vector<int>& nodes) {
+  const int rotating = model.rotating() - model.freeBegin();
+  const auto unknowns =
+      nodes.size() + static_cast<std::size_t>(std::lower_bound(nodes.begin(), nodes.end(), rotating) - nodes.begin());
+  return model.turning() > 0 && unknowns > smallSystem;
 }
 
 }  // namespace tiefmu

@@ -12,12 +12,15 @@ namespace {
 // slave turns the three components part and the matrix is scalar, one row a node.
 class Direct : public ConsistentInertia {
  public:
-  explicit Direct(const Model& model);
-  void update(const double* nodeMass, const double* nodeInertia, const double* slaveMass, const double* slaveInertia,
-              const double* offset, const std::vector<SegmentFrame>& frames) override;
-  void solve(const double* force, const double* moment, double* a, double* z) override;
+  Direct(const Model& model, const std::vector<int>& nodes);
+  void prepare(const double*, const double*) override {}
+  void update(const InertiaGeometry& geometry) override;
+  void solve(const Ties& ties, double tolerance, const double* force, const double* moment, double* a,
+             double* z) override;
 
  private:
+  // Of the model, which unknown i moves or turns.
+  int node(int i) const { return model_.freeBegin() + node_[i < free_ ? i : i - free_]; }
   void findPattern();
   void findFactorPattern();
   void addBlock(int slot, const Mat3& block);
@@ -36,9 +39,9 @@ class Direct : public ConsistentInertia {
   std::vector<double> x_;
 };
 
-Direct::Direct(const Model& model) : ConsistentInertia(model) {
+Direct::Direct(const Model& model, const std::vector<int>& nodes) : ConsistentInertia(model, nodes) {
   unknowns_ = free_ + freeRotating_;
-  width_ = model.turning() ? 3 : 1;
+  width_ = turning_ ? 3 : 1;
   findPattern();
   findFactorPattern();
   x_.resize(3 * static_cast<std::size_t>(unknowns_));
@@ -47,10 +50,8 @@ Direct::Direct(const Model& model) : ConsistentInertia(model) {
 // Unknowns of a segment: the translations of its corners, then, for a rotation coupling, their rotations.
 void Direct::findPattern() {
   const auto unknown = [&](const TieGroup& group, int e, int local) {
-    const int node =
-        group.node[static_cast<std::size_t>(group.corners) * e + local % group.corners] - model_.freeBegin();
-    if (node < 0 || node >= free_) return -1;
-    return local < group.corners ? node : free_ + node;
+    const int node = numberOf(group.node[static_cast<std::size_t>(group.corners) * e + local % group.corners]);
+    return node < 0 || local < group.corners ? node : free_ + node;
   };
   std::vector<std::pair<int, int>> pairs;
   for (const TieGroup& group : model_.groups) {
@@ -214,7 +215,12 @@ void Direct::addSegments(const TieGroup& group, const std::vector<int>& slots, c
                          const double* slaveInertia, const double* offset, const SegmentFrame* frame) {
   const int n = group.corners;
   const int* slot = slots.data();
+  const int corners = group.coupling == Coupling::rotation ? 2 * n : n, count = corners * (corners + 1) / 2;
   for (int e = 0; e < group.segments(); ++e) {
+    if (std::all_of(slot, slot + count, [](int k) { return k < 0; })) {  // a segment that is solved by itself
+      slot += count;
+      continue;
+    }
     const int first = group.firstSlave + group.begin[e], last = group.firstSlave + group.begin[e + 1];
     const double* phi = &group.weight[static_cast<std::size_t>(n) * group.begin[e]];
     if (group.coupling == Coupling::meanMotion) {
@@ -268,11 +274,10 @@ void Direct::addSegments(const TieGroup& group, const std::vector<int>& slots, c
   }
 }
 
-void Direct::update(const double* nodeMass, const double* nodeInertia, const double* slaveMass,
-                    const double* slaveInertia, const double* offset, const std::vector<SegmentFrame>& frames) {
+void Direct::update(const InertiaGeometry& geometry) {
   std::fill(value_.begin(), value_.end(), 0.0);
   for (int i = 0; i < unknowns_; ++i) {
-    const double own = i < free_ ? nodeMass[model_.freeBegin() + i] : nodeInertia[model_.freeBegin() + i - free_];
+    const double own = i < free_ ? model_.nodeMass[node(i)] : model_.nodeInertia[node(i)];
     const int p = position_[i];
     const std::size_t diagonal = static_cast<std::size_t>(columnBegin_[p + 1]) - 1;  // rows ascend: the last is p
     for (int c = 0; c < width_; ++c) value_[width_ * width_ * diagonal + (width_ + 1) * c] += own;
@@ -280,7 +285,8 @@ void Direct::update(const double* nodeMass, const double* nodeInertia, const dou
   std::size_t frame = 0;
   for (std::size_t g = 0; g < model_.groups.size(); ++g) {
     const TieGroup& group = model_.groups[g];
-    addSegments(group, slots_[g], slaveMass, slaveInertia, offset, frames.data() + frame);
+    addSegments(group, slots_[g], geometry.slaveMass, geometry.slaveInertia, geometry.offset,
+                geometry.ties.frames().data() + frame);
     if (group.coupling == Coupling::meanMotion) frame += group.segments();
   }
   if (factor()) return;
@@ -289,24 +295,20 @@ void Direct::update(const double* nodeMass, const double* nodeInertia, const dou
   refuse(unknown < free_ ? unknown : unknown - free_, unknown >= free_);
 }
 
-void Direct::solve(const double* force, const double* moment, double* a, double* z) {
-  for (int i = 0; i < unknowns_; ++i) {
-    at(x_.data(), position_[i]) = i < free_ ? at(force, i) : at(moment, i - free_);
-  }
+void Direct::solve(const Ties&, double, const double* force, const double* moment, double* a, double* z) {
+  const auto load = [&](int i) { return i < free_ ? at(force, node(i)) : at(moment, node(i)); };
+  for (int i = 0; i < unknowns_; ++i) at(x_.data(), position_[i]) = load(i);
   if (width_ == 1)
     substitute<3>(x_.data());
   else
     substitute<1>(x_.data());
-  for (int i = 0; i < unknowns_; ++i) {
-    if (i < free_)
-      at(a, i) = at(x_.data(), position_[i]);
-    else
-      at(z, i - free_) = at(x_.data(), position_[i]);
-  }
+  for (int i = 0; i < unknowns_; ++i) at(i < free_ ? a : z, node(i)) = at(x_.data(), position_[i]);
 }
 
 }  // namespace
 
-std::unique_ptr<ConsistentInertia> directInertia(const Model& model) { return std::make_unique<Direct>(model); }
+std::unique_ptr<ConsistentInertia> directInertia(const Model& model, const std::vector<int>& nodes) {
+  return std::make_unique<Direct>(model, nodes);
+}
 
 }  // namespace tiefmu

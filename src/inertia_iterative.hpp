@@ -7,9 +7,9 @@
 
 namespace tiefmu {
 
-// A system of any size with memory linear in it. Preconditioned by a symmetric Gauss-Seidel sweep over the nodes, whose
-// six freedoms are solved together: the slaves' offsets couple a node's rotation with its translation firmly, but one
-// node with the next as loosely as in any finite element mass matrix.
-std::unique_ptr<ConsistentInertia> iterativeInertia(const Model& model);
+// A system of any size, never assembled. Preconditioned by the nodes' own blocks, six freedoms at a time: the slaves'
+// offsets couple a node's rotation with its translation firmly, but one node with the next as loosely as in any finite
+// element mass matrix.
+std::unique_ptr<ConsistentInertia> iterativeInertia(const Model& model, const std::vector<int>& nodes);
 
 }  // namespace tiefmu

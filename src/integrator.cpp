@@ -28,6 +28,7 @@ bool Integrator::step(double tau, double h) {
       d.drift(h, 0);
       d.inputsAt(tau, h);
       d.setForceVelocities(0.5 * h * prediction(h), 0.5 * h);
+      d.guessAccelerations(true);
       d.evaluate();
       d.kick(0.5 * h);
       return true;
@@ -37,6 +38,7 @@ bool Integrator::step(double tau, double h) {
       d.drift(h, 0);
       d.inputsAt(tau, h);
       d.setForceVelocities(0, 0);
+      d.guessAccelerations(true);
       return false;
     case Method::nohBathe: {
       const double h1 = nohBathe::p * h, h2 = (1 - nohBathe::p) * h;
@@ -48,6 +50,7 @@ bool Integrator::step(double tau, double h) {
       d.setForceVelocities(h1, h1);
       d.kick(0.5 * h1);
       std::copy_n(a, earlier_.size(), earlier_.begin());
+      d.guessAccelerations(true);
       d.evaluate();
       d.kick(0.5 * h1);
       d.inputsOver(tau + h1, h2);
@@ -58,7 +61,8 @@ bool Integrator::step(double tau, double h) {
       d.kick((0.5 + nohBathe::q1) * h2);
       std::swap_ranges(earlier_.begin(), earlier_.end(), a);
       d.kick(nohBathe::q0 * h2);
-      std::swap_ranges(earlier_.begin(), earlier_.end(), a);  // a_1 as the guess of an iterative solution
+      std::swap_ranges(earlier_.begin(), earlier_.end(), a);
+      d.guessAccelerations(true);
       d.evaluate();
       d.kick(nohBathe::q2 * h2);
       return true;
@@ -88,6 +92,7 @@ void Integrator::rungeKutta(double tau, double h) {
       d.inputsAt(tau, ahead[stage - 1] * h);
       d.ties.updateGeometry();
       d.setForceVelocities(0, 0);
+      d.guessAccelerations(false);
       d.evaluate();
     }
     d.rates(rates_.data());
@@ -101,6 +106,7 @@ void Integrator::rungeKutta(double tau, double h) {
   d.normalise();
   d.ties.updateGeometry();
   d.setForceVelocities(0, 0);
+  d.guessAccelerations(false);
 }
 
 }  // namespace tiefmu

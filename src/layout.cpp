@@ -2,6 +2,9 @@
 
 #include <algorithm>
 
+#include "inertia.hpp"
+#include "inertia_islands.hpp"
+
 namespace tiefmu {
 namespace {
 
@@ -49,6 +52,9 @@ bool isPresent(const FieldRow& row, const Model& model) {
              });
     case When::biased:
       return model.anyFree() && model.settings.inertia == Inertia::consistent && model.finite() && model.turning() > 0;
+    case When::iterated:
+      return model.anyFree() && model.settings.inertia == Inertia::consistent && model.turning() > 0 &&
+             ConsistentInertia::iterates(model, SegmentsAlone(model).rest);
     case When::modeKept: return model.anyFree() && model.finite() && !model.springs.empty();
     case When::exposed: return model.exposes(row.exposedAs);
   }

@@ -57,7 +57,8 @@ struct TieGroup {
   std::vector<int> node;       // corners per segment: independent node indices
   std::vector<int> begin;      // segments + 1: slaves of segment e are firstSlave + [begin[e], begin[e+1])
   std::vector<double> weight;  // corners per slave: Phi at the projection, sum 1
-  std::vector<int> partEnd;    // ends of Partition: parts for threads, then the separator
+  std::vector<int> partEnd;    // Partition: parts for threads,
+  std::vector<int> phaseEnd;   // and the phases in which they come
   int segments() const { return static_cast<int>(begin.size()) - 1; }
   int slaves() const { return begin.back(); }
 };

@@ -5,10 +5,10 @@
 
 namespace tiefmu {
 
-// Segments in parts of which no two touch a common node, and the separator: the segments between them, which may touch
-// any. `order`: the parts' segments one part after the other, then the separator's; `end`: where each part ends, the
-// last where the separator begins.
-struct Partition { std::vector<int> order, end; };
+// Segments in parts, and these in phases: no two parts of a phase touch a common node. What lies between the parts of a
+// phase makes those of the next; the last has one part. `order`: the segments one part after the other; `end`: where
+// each part ends; `phaseEnd`: how many parts there are up to the end of each phase.
+struct Partition { std::vector<int> order, end, phaseEnd; };
 // `node`: `corners` node indices per segment. How many parts there are follows from the number of segments alone.
 Partition partition(const std::vector<int>& node, int corners);
 

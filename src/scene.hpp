@@ -95,6 +95,7 @@ struct Settings {
   Geometry geometry{};
   Position position{};
   Vec3 gravity = Vec3::Zero();  // m/s2
+  double solverTolerance = 0;   // of consistent inertia: residual over right side, above 0
   Method method{};
   double timeStep = 0;  // s; 0: safety * limit
   double safety = 0;    // above 0
@@ -108,13 +109,19 @@ template <class T> struct SettingsMember {
   const char* key;
   T Settings::* member;
 };
-inline constexpr std::tuple settingsMembers{
-    SettingsMember{"inertia", &Settings::inertia},    SettingsMember{"reaction", &Settings::reaction},
-    SettingsMember{"geometry", &Settings::geometry},  SettingsMember{"position", &Settings::position},
-    SettingsMember{"gravity", &Settings::gravity},    SettingsMember{"method", &Settings::method},
-    SettingsMember{"time_step", &Settings::timeStep}, SettingsMember{"safety", &Settings::safety},
-    SettingsMember{"threads", &Settings::threads},    SettingsMember{"names", &Settings::names},
-    SettingsMember{"expose", &Settings::expose},      SettingsMember{"hide", &Settings::hide}};
+inline constexpr std::tuple settingsMembers{SettingsMember{"inertia", &Settings::inertia},
+                                            SettingsMember{"reaction", &Settings::reaction},
+                                            SettingsMember{"geometry", &Settings::geometry},
+                                            SettingsMember{"position", &Settings::position},
+                                            SettingsMember{"solver_tolerance", &Settings::solverTolerance},
+                                            SettingsMember{"gravity", &Settings::gravity},
+                                            SettingsMember{"method", &Settings::method},
+                                            SettingsMember{"time_step", &Settings::timeStep},
+                                            SettingsMember{"safety", &Settings::safety},
+                                            SettingsMember{"threads", &Settings::threads},
+                                            SettingsMember{"names", &Settings::names},
+                                            SettingsMember{"expose", &Settings::expose},
+                                            SettingsMember{"hide", &Settings::hide}};
 
 namespace detail {
 

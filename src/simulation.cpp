@@ -339,6 +339,11 @@ void Simulation::updateOutputs() {
   s.outputsDirty = false;
 }
 
+void Simulation::updateReactions() {
+  updateOutputs();
+  impl_->dynamics.bringReactions();
+}
+
 void Simulation::directionalDerivative(double* derivative) {
   updateOutputs();
   if (!impl_->derivative) impl_->derivative = std::make_unique<DirectionalDerivative>(impl_->dynamics);

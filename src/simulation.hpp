@@ -47,6 +47,8 @@ class Simulation {
   void step(double duration);
   // Brings outputs in line with the inputs last set; cheap when nothing changed.
   void updateOutputs();
+  // Then the reactions on free nodes too, which no variable shows and no step may need.
+  void updateReactions();
 
   // Saved state: `data` and what stands beside it. `restore` takes only what `save` of the same model gave.
   struct State {

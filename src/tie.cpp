@@ -49,6 +49,8 @@ bool useBaselineKernels(bool baseline) {
   return kernels == &baselineKernels;
 }
 
+bool usesBaselineKernels() { return kernels == &baselineKernels; }
+
 void mapMotion(const TieGroup& group, SegmentRange range, TieGeometry geometry, const double* u, const double* turn,
                double* us, double* turns) {
   assert(u && us);

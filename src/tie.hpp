@@ -18,6 +18,7 @@ namespace tiefmu {
 // the baseline instead, for the whole process (tests; results do not depend on it). Returns whether it is the baseline
 // now.
 bool useBaselineKernels(bool baseline);
+bool usesBaselineKernels();
 
 // u_s = T u. `u`, `turn`: 3 per node / rotating node (velocity and spin, or acceleration, or displacement and small
 // rotation); writes `us` (3 per slave) and `turns` (3 per turning slave). [theory (2.2), (2.6)]

@@ -103,15 +103,8 @@ void Ties::distributeLoads(const double* force, const double* moment, double* f,
     const auto part = [&](int first, int last) {
       tiefmu::distributeLoads(group, {first, last}, geometry(g), force, moment, f, t);
     };
-    if (!pool_) {
-      part(0, group.segments());
-      continue;
-    }
-    // Parts touch no common node, so that the sums do not depend on who is first; the separator comes after all of
-    // them.
     const std::vector<int>& end = group.partEnd;
-    pool_->each(static_cast<int>(end.size()), [&](int k) { part(k == 0 ? 0 : end[k - 1], end[k]); });
-    part(end.back(), group.segments());
+    eachInPhases(group, [&](int k) { part(k == 0 ? 0 : end[k - 1], end[k]); });
   }
 }
 
@@ -153,11 +146,12 @@ void Ties::placeSlaves(double* xs) {
   eachPart([&](const TieGroup&, SegmentRange range, TieGeometry, std::size_t g) { placeSlaves(g, range, xs); });
 }
 
-double Ties::largestSpin2(const double* v) const {
+double Ties::largestSpin2(const double* v, const std::vector<std::vector<std::uint8_t>>& without) const {
   double largest = 0;
-  eachGroup([&](const TieGroup& group, SegmentRange, TieGeometry shape, std::size_t) {
+  eachGroup([&](const TieGroup& group, SegmentRange, TieGeometry shape, std::size_t g) {
     if (group.coupling != Coupling::meanMotion) return;
     for (int e = 0; e < group.segments(); ++e) {
+      if (without[g][e]) continue;
       Vec3 spin;
       meanSpin(group, {e, e + 1}, shape.frame, v, spin.data() - 3 * static_cast<std::ptrdiff_t>(e));
       largest = std::max(largest, spin.squaredNorm());

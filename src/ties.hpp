@@ -31,6 +31,7 @@ class Ties {
   std::string findCollapsedSegment();
   TieGeometry geometry(std::size_t group) const;
   const std::vector<SegmentFrame>& frames() const { return frames_; }
+  std::size_t firstFrame(std::size_t group) const { return firstFrame_[group]; }
   bool offsetsTurn() const { return offsetsTurn_; }  // in rotation groups, where they are states
   bool hasBias() const { return bias_; }             // slaves' accelerations have a part quadratic in velocities
 
@@ -45,7 +46,8 @@ class Ties {
   // The same for some segments of one group, after `beginPlacing`.
   void beginPlacing();
   void placeSlaves(std::size_t group, SegmentRange range, double* xs);
-  double largestSpin2(const double* v) const;  // of the meanMotion segments, squared, (rad/s)^2
+  // Of the meanMotion segments (per group) but these, squared, (rad/s)^2.
+  double largestSpin2(const double* v, const std::vector<std::vector<std::uint8_t>>& without) const;
 
   // --- motion: v, w of the nodes
   void move(double h, const double* v, const double* w);  // before the positions: offsets, rotations, frames over h
@@ -54,6 +56,11 @@ class Ties {
 
   // body(first, last) over blocks of [0, count), shared among threads.
   template <class Body> void eachBlock(std::size_t count, Body body) const;
+  // body(k) for each part k of a group, shared among threads. Parts of a phase touch no common node, so that sums do
+  // not depend on who is first.
+  template <class Body> void eachInPhases(const TieGroup& group, const Body& body) const;
+  // body(k) for k in [0, count), shared among threads.
+  template <class Body> void each(int count, const Body& body) const;
   // body(group, all its segments, geometry, index)
   template <class Body> void eachGroup(Body body) const;
 
@@ -87,11 +94,24 @@ template <class Body> void Ties::eachPart(Body body) const {
   for (std::size_t g = 0; g < model_.groups.size(); ++g) {
     const TieGroup& group = model_.groups[g];
     const std::vector<int>& end = group.partEnd;
-    pool_->each(static_cast<int>(end.size()) + 1, [&](int k) {
-      const int first = k == 0 ? 0 : end[k - 1], last = k < static_cast<int>(end.size()) ? end[k] : group.segments();
+    pool_->each(static_cast<int>(end.size()), [&](int k) {
+      const int first = k == 0 ? 0 : end[k - 1], last = end[k];
       if (first < last) body(group, SegmentRange{first, last}, geometry(g), g);
     });
   }
+}
+
+template <class Body> void Ties::eachInPhases(const TieGroup& group, const Body& body) const {
+  int first = 0;
+  for (int last : group.phaseEnd) {
+    each(last - first, [&](int k) { body(first + k); });
+    first = last;
+  }
+}
+
+template <class Body> void Ties::each(int count, const Body& body) const {
+  if (pool_) return pool_->each(count, body);
+  for (int k = 0; k < count; ++k) body(k);
 }
 
 template <class Body> void Ties::eachBlock(std::size_t count, Body body) const {

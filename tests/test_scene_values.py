@@ -36,6 +36,10 @@ FINITE = [
 ]
 NUMBER = FINITE + [(-1e-3, "-0.001 is negative; it must be 0 or more")]
 POSITIVE = FINITE + [(0, "0 is too small; it must be more than 0"), (-1, "-1 is too small; it must be more than 0")]
+TOLERANCE = FINITE + [
+    (0, "0 is too small; it must be at least 1e-13"),
+    (0.1, "0.1 is too large; it must be at most 0.01"),
+]
 THREADS = [
     (0, "0 is too small; it must be at least 1"),
     (-3, "-3 is too small; it must be at least 1"),
@@ -168,6 +172,7 @@ KEYS = {
     ("initial", 0, "w"): VECTOR,
     ("model",): TABLE,
     ("model", "inertia"): one_of("lumped", "consistent"),
+    ("model", "solver_tolerance"): TOLERANCE,
     ("model", "reaction"): one_of("loads", "full", "split"),
     ("model", "geometry"): one_of("finite", "small"),
     ("model", "position"): one_of("integrated", "input"),

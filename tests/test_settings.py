@@ -54,6 +54,7 @@ def test_every_key_arrives():
     scene["units"] = {"length": "mm", "time": "ms"}
     scene["model"] = {
         "inertia": "consistent",
+        "solver_tolerance": 1e-9,
         "reaction": "split",
         "geometry": "small",
         "position": "input",
@@ -69,6 +70,7 @@ def test_every_key_arrives():
     assert settings.method == _core.Method.noh_bathe
     assert settings.names == _core.Names.flat
     np.testing.assert_allclose(settings.gravity, [1e3, 2e3, -3e3], rtol=1e-15)
+    assert settings.solver_tolerance == 1e-9
     assert (settings.time_step, settings.safety, settings.threads) == (0.25e-3, 0.75, 3)
     assert (settings.expose, settings.hide) == (["energy"], ["slave.v"])
     new = _core.Settings()

@@ -135,6 +135,20 @@ def test_the_builds_of_the_kernels_agree_on_scenes_of_all_kinds(settings):
         kernels.use_baseline(False)
 
 
+@pytest.mark.parametrize("formulation, rotations", [("default", True), ("optimized", False), ("optimized", True)])
+def test_connected_surfaces_with_consistent_inertia(formulation, rotations):
+    """Sums of the iteration, too, are the same whoever makes them."""
+    model = {"inertia": "consistent"}
+    first = trajectory(panel(formulation, rotations, "free", model=model))
+    threaded = panel(formulation, rotations, "free", model=model, integrator={"threads": 3})
+    assert np.array_equal(first, trajectory(threaded))
+    kernels.use_baseline(True)
+    try:
+        assert np.array_equal(first, trajectory(threaded))
+    finally:
+        kernels.use_baseline(False)
+
+
 def test_order_of_the_input_does_not_matter():
     """Scattered ids and segments give the same motion, to rounding: sums come in another order."""
 

@@ -26,7 +26,10 @@ class NamedSimulation {
 
   Array<double> get(const std::string& name) {
     const FieldRow& f = find(name);
-    simulation.updateOutputs();
+    if (f.field == Field::reactionForce || f.field == Field::reactionMoment)
+      simulation.updateReactions();
+    else
+      simulation.updateOutputs();
     const Slice slice = simulation.layout()[f.field];
     std::vector<double> values(simulation.field(f.field), simulation.field(f.field) + slice.count);
     if (f.components == 1 || f.per == Per::simulation) return numpy(std::move(values));

@@ -6,7 +6,7 @@ import os
 import sys
 from pathlib import Path
 
-from . import __version__, advise, study
+from . import __version__, advise, lumping, study
 from .acceptance import command as accept_command
 from .arguments import check_folder_of, existing, is_fmu, positive, whole
 from .binaries import libraries, stale
@@ -168,6 +168,8 @@ def run_build(options: argparse.Namespace) -> None:
         )
     systems = ", ".join(library.text for library in libraries(options.platforms))
     print(f"{fmu}: {summary(found)}, {fmu.stat().st_size / 1024:.0f} KiB, for {systems}")
+    if found["lumping"]:
+        print(lumping.line(found["lumping"]))
     if found["notes"]:
         print(f"{counted(len(found['notes']), 'note')} on the scene: tiefmu info {options.scene}")
 

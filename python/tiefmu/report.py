@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from . import _core
+from . import _core, lumping
 from .errors import UsageError
 from .scene import MOTIONS, Scene
 
@@ -26,6 +26,7 @@ def report(scene: Scene, positions: bool = False) -> dict:
     `added`: lumped mass and inertia on each master (theory 4). A step that nothing limits is 1e30; an infinite `cond`
     or `lambda` is null. `position`: of masters and points at the start, where they are at most MOST_PLACES, or
     if asked for by `positions`. `interface`: the variables, a row a kind.
+    `lumping`: see lumping.py; null where no master is free or inertia is consistent.
     """
     found = scene.model.report()
     slaves, nodes = found["slaves"], found["nodes"]
@@ -49,6 +50,7 @@ def report(scene: Scene, positions: bool = False) -> dict:
         "stable_time_step": scene.start.get("stable_time_step").tolist()[0],
         "nodal_time_step": scene.start.get("nodal_time_step").tolist()[0],
         "integrator_limit": scene.start.integrator_limit,
+        "lumping": lumping.lumping(found) if scene.settings.inertia == "lumped" else None,
         "freedoms": freedoms(scene, nodes),
         "variables": variables,
         "interface": interface_rows(scene),
@@ -283,6 +285,8 @@ def text(name: str, found: dict) -> str:
         f"  method  {step(found['integrator_limit'])}   limit of the chosen integrator",
         "",
     ]
+    if found.get("lumping"):  # FMUs of an earlier program have none
+        lines.append(lumping.line(found["lumping"]))
     lines.append(
         f"freedoms: {found['freedoms']['translations']} translations, {found['freedoms']['rotations']} rotations"
     )

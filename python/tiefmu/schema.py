@@ -257,6 +257,7 @@ class Initial(Table):
 
 class Model(Table):
     inertia: Literal["lumped", "consistent"] = "lumped"
+    solver_tolerance: Annotated[float, Field(ge=1e-13, le=1e-2)] = 1e-4
     reaction: Literal["loads", "full", "split"] = "loads"
     geometry: Literal["finite", "small"] = "finite"
     position: Literal["integrated", "input"] = "integrated"

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .. import schema
-from .variants import change
+from .variants import EXACT_TOLERANCE, change
 
 if TYPE_CHECKING:
     from .coupling_runs import Study
@@ -27,6 +27,7 @@ class Reference:
         self.study = study
         tables = study.tables(reaction)
         tables.model.reaction, tables.model.inertia, tables.model.position = "loads", "consistent", "integrated"
+        tables.model.solver_tolerance = EXACT_TOLERANCE
         if reaction == "spring-damper":
             tables.model.inertia = "lumped"  # of massless slaves: nothing to lump
         change(tables.integrator, method="rk4", time_step=0.0, safety=0.5)

@@ -16,6 +16,7 @@ from ..units import DIMENSIONS, Units
 
 METHODS = ["central-difference", "symplectic-euler", "noh-bathe", "rk4"]
 HEAVY = 1e18  # mass of a driven node made free, in units of what else there is: its motion is then what was given
+EXACT_TOLERANCE = 1e-12  # of the equations of consistent inertia
 
 
 @dataclass(frozen=True)
@@ -123,6 +124,8 @@ class Source:
         if heavy and self.any_driven:
             tables = self.arrays(tables, heavy=True)
         change(tables.model, reaction=reaction, position="integrated")
+        if method == "rk4":  # references, and errors below what the default leaves
+            change(tables.model, solver_tolerance=EXACT_TOLERANCE)
         default = schema.Integrator()
         change(tables.integrator, method=method, time_step=default.time_step, safety=default.safety)
         change(tables.interface, expose=["energy"] if energy else [], hide=[])
