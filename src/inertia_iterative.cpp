@@ -303,7 +303,7 @@ void Iterative::solve(const Ties& ties, double tolerance, const double* force, c
   finish(ties, tolerance, a, z);
 }
 
-// Conjugate gradients with one pass over the nodes and one over the segments an iteration [Chronopoulos, Gear 1989];
+// Conjugate gradients with one pass over the nodes and one over the segments an iteration [Chronopoulos & Gear 1989];
 // preconditioned by the diagonal blocks.
 void Iterative::finish(const Ties& ties, double tolerance, double* a, double* z) {
   for (std::vector<double>* v : {&direction_, &image_})
