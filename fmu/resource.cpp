@@ -12,7 +12,7 @@ namespace tiefmu {
 namespace {
 
 constexpr std::string_view magic = "tiefmu scene\n";
-constexpr std::uint32_t formatVersion = 3;  // raise it whenever a `field` changes
+constexpr std::uint32_t formatVersion = 4;  // raise it whenever a `field` changes
 constexpr std::size_t headerSize = magic.size() + 4 + 8 + 8;
 
 // FNV-1a, 64 bit: against damage in transport, not against intent.
