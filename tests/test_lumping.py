@@ -49,7 +49,7 @@ def test_where_it_says_nothing():
 
 
 def test_masters_without_mass_of_their_own():
-    scene = one_segment(np.random.default_rng(6), slaves=1, motion="free")
+    scene = one_segment(np.random.default_rng(6), 4, "optimized", False, slaves=1, motion="free")
     for table in scene["node"]:
         if table["nodes"][0] in (1, 2, 3, 4):
             table["mass"] = table["inertia"] = 0.0
