@@ -13,7 +13,7 @@ FORMS = [("default", True), ("optimized", False), ("optimized", True)]
 forms = pytest.mark.parametrize("formulation, rotations", FORMS)
 
 
-def surface(formulation, rotations, tolerance, heavy=1.0, side=5):
+def surface(formulation, rotations, tolerance, heavy=1.0, side=6):
     """A panel that moves and turns, with loads; its slaves `heavy` times as heavy as a node and more."""
     scene = panel(formulation, rotations, "free", side, shuffled=True)
     rng = np.random.default_rng(8)
@@ -110,7 +110,7 @@ def test_energy_and_momentum(formulation, rotations):
     by no more than twice what central difference makes of it."""
 
     def run(tolerance):
-        scene, _ = surface(formulation, rotations, tolerance, side=4)
+        scene, _ = surface(formulation, rotations, tolerance)
         program, problem = started(scene, {}), Problem(scene)
         mass = np.concatenate([problem.mass, [s.mass for s in problem.slaves]])
         ids = [*problem.ids, *(s.id for s in problem.slaves)]
