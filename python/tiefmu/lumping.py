@@ -45,7 +45,7 @@ def lumping(found: dict) -> dict | None:
 
 
 def line(row: dict) -> str:
-    price = "two to five times" if row["connected"] else "up to one and a half times"
+    price = "two to ten times" if row["connected"] else "one to four times"
     ratio = (
         "motions without any true energy" if row["ratio"] is None else f"up to {row['ratio']:.3g} times the true one"
     )
