@@ -5,9 +5,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import tiefmu
 from input_deck import InputDeck
 from test_decks_scene import run_in_fmpy
-from tiefmu import decks, scene
+from tiefmu import decks
 from tiefmu.decks import abaqus
 from tiefmu.decks.abaqus import keywords, loads
 from tiefmu.decks.element_properties import nodal
@@ -409,7 +410,7 @@ LAP_JOINT = Path(__file__).parent / "decks" / "lap_joint.inp"
 
 def test_a_deck_of_the_repository_runs_in_fmpy(tmp_path):
     decks.import_deck(LAP_JOINT, tmp_path / "scene.toml")
-    one, two = (report(scene.load(path)) for path in (tmp_path / "scene.toml", LAP_JOINT))
+    one, two = (report(tiefmu.load(path)) for path in (tmp_path / "scene.toml", LAP_JOINT))
     assert one["slaves"] == two["slaves"] and len(one["slaves"]) == 10
     run_in_fmpy(LAP_JOINT, tmp_path)
     run_in_fmpy(LAP_JOINT, tmp_path, free=("Block-1",))
@@ -439,10 +440,10 @@ def test_a_mesh_file_of_a_scene_is_read_as_before(tmp_path):
         "tie": [{"segments": "Top", "slaves": "foot", "search_distance": 0.001}],
         "units": {"length": "mm"},
     }
-    with pytest.raises(scene.SceneError, match=r"no segment found within search_distance 0.001 mm"):
-        scene.load(tables)
+    with pytest.raises(tiefmu.SceneError, match=r"no segment found within search_distance 0.001 mm"):
+        tiefmu.load(tables)
     tables["tie"][0]["search_distance"] = 0.3
-    assert [row["id"] for row in report(scene.load(tables))["slaves"]] == [301]
+    assert [row["id"] for row in report(tiefmu.load(tables))["slaves"]] == [301]
 
 
 # refusals, pages

@@ -3,8 +3,9 @@
 import fmpy
 import fmpy.validation
 import pytest
+import tiefmu
 from dyna_cards import DynaDeck
-from tiefmu import decks, scene
+from tiefmu import decks
 from tiefmu.package import build
 from tiefmu.report import report
 
@@ -279,7 +280,7 @@ def test_the_written_scene_is_the_deck(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     everything().write(tmp_path / "deck.k")
     decks.import_deck(tmp_path / "deck.k", tmp_path / "weld.toml")
-    one, two = report(scene.load(tmp_path / "weld.toml")), report(scene.load(tmp_path / "deck.k"))
+    one, two = report(tiefmu.load(tmp_path / "weld.toml")), report(tiefmu.load(tmp_path / "deck.k"))
     for key in ("slaves", "masters", "variables", "stable_time_step", "nodal_time_step"):
         assert one[key] == two[key], key
     text = " ".join((tmp_path / "weld.toml").read_text().replace("#  ", "").split())

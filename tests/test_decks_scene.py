@@ -7,8 +7,9 @@ import fmpy
 import fmpy.validation
 import numpy as np
 import pytest
+import tiefmu
 from deck_cards import RadiossDeck
-from tiefmu import decks, scene
+from tiefmu import decks
 from tiefmu.package import build
 from tiefmu.report import report
 
@@ -254,7 +255,7 @@ def test_the_written_scene_is_the_deck(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     everything().write(tmp_path / "deck_0000.rad")
     decks.import_deck(tmp_path / "deck_0000.rad", tmp_path / "weld.toml")
-    written, direct = scene.load(tmp_path / "weld.toml"), scene.load(tmp_path / "deck_0000.rad")
+    written, direct = tiefmu.load(tmp_path / "weld.toml"), tiefmu.load(tmp_path / "deck_0000.rad")
     one, two = report(written), report(direct)
     for key in ("slaves", "masters", "variables", "stable_time_step", "nodal_time_step"):
         assert one[key] == two[key], key
@@ -311,6 +312,6 @@ def test_a_built_deck_runs_in_fmpy(tmp_path):
 @pytest.mark.parametrize("path", DECKS)
 def test_decks_of_the_repository_run_in_fmpy(tmp_path, path):
     decks.import_deck(path, tmp_path / "scene.toml")
-    assert report(scene.load(tmp_path / "scene.toml"))["slaves"] == report(scene.load(path))["slaves"]
+    assert report(tiefmu.load(tmp_path / "scene.toml"))["slaves"] == report(tiefmu.load(path))["slaves"]
     run_in_fmpy(path, tmp_path)
     run_in_fmpy(path, tmp_path, free=("1", "2"))
