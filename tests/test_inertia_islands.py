@@ -139,7 +139,7 @@ def test_motion(mixed, formulation, rotations):
 
 @forms
 def test_momentum_and_energy_in_free_flight(formulation, rotations):
-    """No loads: momentum to rounding, energy to the order of central difference."""
+    """No loads: both are kept to the order of central difference, and exactly where nothing turns with the masters."""
     scene, _ = welds(5, formulation, rotations)
     program = started(scene, {})
     problem = Problem(scene)
@@ -153,6 +153,6 @@ def test_momentum_and_energy_in_free_flight(formulation, rotations):
     for steps in (100, 200):
         program = started(scene, {})
         program.step(0.2 / steps, steps)
-        assert np.abs(momentum() - before).max() < 1e-12 * np.abs(before).max()
-        change.append(abs(program["energy.kinetic"] - energy))
-    assert change[1] < 1e-12 * energy or change[1] < 0.35 * change[0]
+        drift = np.abs(momentum() - before).max() / np.abs(before).max()
+        change.append(np.array([drift, abs(program["energy.kinetic"] / energy - 1)]))
+    assert (change[1] < np.maximum(1e-12, 0.35 * change[0])).all()

@@ -106,10 +106,10 @@ def test_a_bad_guess_does_no_harm(bad, formulation, rotations):
 
 @forms
 def test_energy_and_momentum(formulation, rotations):
-    """No loads, three seconds in steps of 0.03. Momentum is conserved to the error of the accelerations; energy drifts
-    by no more than twice what central difference makes of it."""
+    """No loads. Central difference keeps momentum and energy to its order: both drifts fall to a quarter with half the
+    step. The iteration adds its error, as large as its tolerance or smaller."""
 
-    def run(tolerance):
+    def run(tolerance, steps):
         scene, _ = surface(formulation, rotations, tolerance)
         program, problem = started(scene, {}), Problem(scene)
         mass = np.concatenate([problem.mass, [s.mass for s in problem.slaves]])
@@ -119,11 +119,10 @@ def test_energy_and_momentum(formulation, rotations):
             return mass @ np.array([program.of(k, "v") for k in ids])
 
         before, energy = momentum(), program["energy.kinetic"]
-        program.step(0.03, 100)
+        program.step(1.5 / steps, steps)
         scale = mass.sum() * np.sqrt(2 * energy / mass.sum())
-        return np.abs(momentum() - before).max() / scale, abs(program["energy.kinetic"] / energy - 1)
+        return np.array([np.abs(momentum() - before).max() / scale, abs(program["energy.kinetic"] / energy - 1)])
 
-    exact, loose = run(1e-12), run(1e-4)
-    assert exact[0] < 1e-11
-    assert loose[0] < 1e-3
-    assert loose[1] < 2 * exact[1] + 1e-4
+    exact = run(1e-12, 50)
+    assert (run(1e-12, 100) < 0.3 * exact).all()
+    assert (np.abs(run(1e-4, 50) - exact) < 1e-5).all()
