@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from input_deck import InputDeck
 from test_decks_damaged import BITS
-from tiefmu import decks
+from tiefmu import UsageError, decks
 from tiefmu.report import report
 
 RICH = """*HEADING
@@ -172,7 +172,7 @@ def test_random_damage(tmp_path, seed):
         path.write_text(text, encoding="utf-8")
         try:
             decks.compiled(decks.read(path))
-        except decks.SceneError as error:
+        except (decks.SceneError, UsageError) as error:
             assert "\n" not in str(error) and str(error).startswith(str(path)), (error, text)
 
 
@@ -181,7 +181,7 @@ def test_cut_decks(tmp_path, end):
     (tmp_path / "deck.inp").write_text("\n".join(RICH.split("\n")[:end]))
     try:
         decks.compiled(decks.read(tmp_path / "deck.inp"))
-    except decks.SceneError as error:
+    except (decks.SceneError, UsageError) as error:
         assert "\n" not in str(error) and str(error).startswith(str(tmp_path / "deck.inp")), error
 
 
