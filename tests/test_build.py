@@ -185,6 +185,7 @@ REPORT_KEYS = {
     "freedoms",
     "variables",
     "interface",
+    "lumping",
 }
 
 

@@ -314,4 +314,5 @@ def test_decks_of_the_repository_run_in_fmpy(tmp_path, path):
     decks.import_deck(path, tmp_path / "scene.toml")
     assert report(tiefmu.load(tmp_path / "scene.toml"))["slaves"] == report(tiefmu.load(path))["slaves"]
     run_in_fmpy(path, tmp_path)
-    run_in_fmpy(path, tmp_path, free=("1", "2"))
+    if path.suffix != ".inp":  # whose parts have names
+        run_in_fmpy(path, tmp_path, free=("1", "2"))

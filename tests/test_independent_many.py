@@ -51,7 +51,7 @@ def surface(rng, rotations, ties, slaves=120):
         ],
         "tie": tables,
         "initial": [table for table in initial if table["nodes"][0] not in (5, 6, 17)],
-        "model": {"inertia": "consistent", "gravity": [1.0, -2.0, 3.0]},
+        "model": {"inertia": "consistent", "solver_tolerance": 1e-13, "gravity": [1.0, -2.0, 3.0]},
     }
 
 

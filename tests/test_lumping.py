@@ -5,8 +5,7 @@ import pytest
 from independent import Problem
 from random_scenes import one_segment, structure
 from scipy.linalg import eigh
-from tiefmu import lumping, report
-from tiefmu.scene import load
+from tiefmu import load, lumping, report
 
 FORMS = [("default", True), ("default", False), ("optimized", False), ("optimized", True)]
 

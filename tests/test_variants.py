@@ -46,6 +46,7 @@ SCENE = {
     "initial": [{"nodes": [2, 3], "v": [0.1, 0.2, 0.3], "w": [0.0, 0.01, 0.0]}],
     "model": {
         "inertia": "lumped",
+        "solver_tolerance": 1e-5,
         "reaction": "full",
         "geometry": "finite",
         "position": "integrated",
@@ -61,7 +62,7 @@ CHANGED = {  # what a variant is about, and what the studies set themselves
     "tie": {"segments", "slaves"},
     "spring": {"nodes", "ground"},
     "initial": {"nodes"},
-    "model": {"inertia", "geometry", "reaction", "position"},
+    "model": {"inertia", "solver_tolerance", "geometry", "reaction", "position"},
     "integrator": {"method", "time_step", "safety"},
     "interface": {"expose", "hide"},
 }

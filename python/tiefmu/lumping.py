@@ -89,6 +89,8 @@ def of_segment(found: dict, run: np.ndarray, node: np.ndarray, free: np.ndarray,
         inertia = np.repeat([slaves["mass"][s], slaves["inertia"][s]], 3)
         true += t.T @ (inertia[:, None] * t)
     moves = np.repeat(free, 6) & (lumped > 0)
+    if not moves.any():  # slaves without mass
+        return 1.0
     true = true[np.ix_(moves, moves)] + np.diag(own[moves])
     # Scaled to lumped = 1: the smallest eigenvalue of what is true then says it.
     scale = 1 / np.sqrt((own + lumped)[moves])
