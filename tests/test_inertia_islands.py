@@ -120,10 +120,9 @@ def test_accelerations(ratio, mixed, equal, geometry, formulation, rotations):
 
 
 @forms
-@pytest.mark.parametrize("mixed", [False, True])
-def test_motion(mixed, formulation, rotations):
-    """Large rotations on the way."""
-    scene, inputs = welds(4, formulation, rotations, mixed)
+def test_motion(formulation, rotations):
+    """Large rotations on the way, some corners held: nothing else keeps loaded corners together."""
+    scene, inputs = welds(4, formulation, rotations, mixed=True)
     inputs = {key: value for key, value in inputs.items() if key[0] not in "az"}
     problem, end = Problem(scene), 0.5
     expected = problem.solve([0.0, end], constant(inputs))[-1]
