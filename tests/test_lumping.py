@@ -55,3 +55,11 @@ def test_masters_without_mass_of_their_own():
     found = lumping.lumping(load(scene).model.report())
     assert found["ratio"] is None
     assert "without any true energy" in lumping.line(found)
+
+
+def test_slaves_without_mass():
+    scene = one_segment(np.random.default_rng(7), 4, "default", True, slaves=2, motion="free")
+    for table in scene["node"]:
+        if table["nodes"][0] not in (1, 2, 3, 4):
+            table["mass"] = table["inertia"] = 0.0
+    assert lumping.lumping(load(scene).model.report()) is None

@@ -41,6 +41,8 @@ def lumping(found: dict) -> dict | None:
         ratio = of_segment(found, segments[k], node[segments[k][0]], free[segments[k][0]], added)
         if ratio > best["ratio"]:
             best |= {"ratio": ratio, "segment": int(slaves["segment"][segments[k][0]])}
+    if best["ratio"] <= 1:  # slaves without mass
+        return None
     return best | {"ratio": float(f"{best['ratio']:.6g}") if np.isfinite(best["ratio"]) else None}
 
 
@@ -89,7 +91,7 @@ def of_segment(found: dict, run: np.ndarray, node: np.ndarray, free: np.ndarray,
         inertia = np.repeat([slaves["mass"][s], slaves["inertia"][s]], 3)
         true += t.T @ (inertia[:, None] * t)
     moves = np.repeat(free, 6) & (lumped > 0)
-    if not moves.any():  # slaves without mass
+    if not moves.any():
         return 1.0
     true = true[np.ix_(moves, moves)] + np.diag(own[moves])
     # Scaled to lumped = 1: the smallest eigenvalue of what is true then says it.

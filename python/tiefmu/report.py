@@ -26,7 +26,8 @@ def report(scene: Scene, positions: bool = False) -> dict:
     `added`: lumped mass and inertia on each master (theory 4). A step that nothing limits is 1e30; an infinite `cond`
     or `lambda` is null. `position`: of masters and points at the start, where they are at most MOST_PLACES, or
     if asked for by `positions`. `interface`: the variables, a row a kind.
-    `lumping`: see lumping.py; null where no master is free or inertia is consistent.
+    `lumping`: see lumping.py; null where no master is free, no slave has mass, or inertia is
+    consistent.
     """
     found = scene.model.report()
     slaves, nodes = found["slaves"], found["nodes"]
