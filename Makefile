@@ -29,8 +29,9 @@ demo: $(VENV)/installed
 	$(BIN)/tiefmu accept examples/acceptance/weld.toml examples/acceptance/criteria.toml --pictures out/acceptance
 	$(BIN)/tiefmu report scenes/bracket.toml -o out/bracket.html
 
+# A second thread of NumPy's BLAS beside two workers only waits.
 test: $(VENV)/installed tools
-	$(BIN)/python -m pytest -n 2
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n 2
 	@if command -v chromium >/dev/null; then $(BIN)/python -m pytest -m browser; \
 	  else echo "chromium is not installed: make browser opens the report in it"; fi
 
