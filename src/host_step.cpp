@@ -1,7 +1,8 @@
 #include "host_step.hpp"
 
-#include <cmath>
 #include <vector>
+
+#include "stability.hpp"
 
 namespace tiefmu {
 
@@ -10,7 +11,7 @@ HostStep hostStep(const Simulation& simulation) {
   HostStep least;
   const auto consider = [&](double own, double added, double stiffness, int node, int port = -1) {
     if (!(own > 0) || !(stiffness > 0)) return;
-    const double step = std::sqrt(2 * (own + added) / stiffness);
+    const double step = nodalStep(own + added, stiffness);
     if (step < least.step) least = {step, node, port};
   };
   std::vector<std::uint8_t> inPort(static_cast<std::size_t>(model.nodes()));

@@ -232,8 +232,7 @@ void Direct::addSegments(const TieGroup& group, const std::vector<int>& slots, c
         const Vec3 d = at(offset, s);
         mass += slaveMass[s];
         moment += slaveMass[s] * d;
-        second += slaveMass[s] * (d.squaredNorm() * Mat3::Identity() - d * d.transpose()) +
-                  slaveInertia[s] * Mat3::Identity();
+        second += slaveMass[s] * unitInertia(d) + slaveInertia[s] * Mat3::Identity();
       }
       const Eigen::Map<const Mat3> inverse(frame[e].inverse);
       Mat3 spin[4];
@@ -265,8 +264,7 @@ void Direct::addSegments(const TieGroup& group, const std::vector<int>& slots, c
             if (p < n)
               block -= share * slaveMass[s] * skew(d);
             else
-              block += share * (slaveMass[s] * (d.squaredNorm() * Mat3::Identity() - d * d.transpose()) +
-                                slaveInertia[s] * Mat3::Identity());
+              block += share * (slaveMass[s] * unitInertia(d) + slaveInertia[s] * Mat3::Identity());
           }
         }
         addBlock(*slot, block);

@@ -57,7 +57,7 @@ bool standsAlone(const Model& model, const TieGroup& group, int e, const std::ve
   Mat3 inertia = Mat3::Zero();
   for (int i = 0; i < count; ++i) {
     const Vec3 r = x[i] - centre / mobility;
-    inertia += w[i] * (r.squaredNorm() * Mat3::Identity() - r * r.transpose());
+    inertia += w[i] * unitInertia(r);
   }
   const Eigen::SelfAdjointEigenSolver<Mat3> eigen(inertia, Eigen::EigenvaluesOnly);
   return eigen.eigenvalues()(0) > flattest * eigen.eigenvalues()(2);

@@ -2,10 +2,10 @@
 
 import random
 
+import deck_checks
 import numpy as np
 import pytest
 from input_deck import InputDeck
-from test_decks_damaged import BITS
 from tiefmu import UsageError, decks
 from tiefmu.report import report
 
@@ -117,44 +117,23 @@ U
 )  # fmt: skip
 
 
-def damaged(text: str, chance: random.Random) -> str:
-    lines = text.split("\n")
-    bits = [bit.decode("latin-1") for bit in BITS] + [
-        "*",
-        "**",
-        "*PART, NAME=plate",
-        ",",
-        '"',
-        "=",
-        "1.D0",
-        "low.",
-        "E9",
-    ]
-    for _ in range(chance.randrange(1, 4)):
-        at = chance.randrange(len(lines))
-        line, kind = lines[at], chance.randrange(7)
-        if kind == 0:
-            lines.pop(at)
-        elif kind == 1:
-            lines.insert(at, lines[chance.randrange(len(lines))])
-        elif kind == 2:
-            lines[at] = line[: chance.randrange(len(line) + 1)]
-        elif kind == 3:
-            start = chance.randrange(len(line) + 1)
-            lines[at] = line[:start] + chance.choice(bits) + line[start:]
-        elif kind == 4:
-            fields = line.split(",")
-            fields[chance.randrange(len(fields))] = chance.choice(bits)
-            lines[at] = ",".join(fields)
-        elif kind == 5:
-            fields = line.split(",")
-            fields.pop(chance.randrange(len(fields)))
-            lines[at] = ",".join(fields)
-        else:
-            other = chance.randrange(len(lines))
-            lines[at], lines[other] = lines[other], lines[at]
-        lines = lines or [""]
-    return "\n".join(lines)
+BITS = [*deck_checks.BITS, b"*", b"**", b"*PART, NAME=plate", b",", b'"', b"=", b"1.D0", b"low.", b"E9"]
+
+
+def a_field(line: bytes, chance: random.Random) -> bytes:
+    """Another field."""
+    fields = line.split(b",")
+    fields[chance.randrange(len(fields))] = chance.choice(BITS)
+    return b",".join(fields)
+
+
+def a_field_less(line: bytes, chance: random.Random) -> bytes:
+    fields = line.split(b",")
+    fields.pop(chance.randrange(len(fields)))
+    return b",".join(fields)
+
+
+OWN = [a_field, a_field_less]
 
 
 def test_the_rich_deck_is_sound(tmp_path):
@@ -168,8 +147,8 @@ def test_the_rich_deck_is_sound(tmp_path):
 def test_random_damage(tmp_path, seed):
     chance, path = random.Random(seed), tmp_path / "deck.inp"
     for _ in range(60):
-        text = damaged(RICH, chance)
-        path.write_text(text, encoding="utf-8")
+        text = deck_checks.damaged(RICH.encode(), chance, BITS, OWN)
+        path.write_bytes(text)
         try:
             decks.compiled(decks.read(path))
         except (decks.SceneError, UsageError) as error:

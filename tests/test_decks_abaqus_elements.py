@@ -3,9 +3,9 @@ hand."""
 
 import numpy as np
 import pytest
+from deck_checks import by_node
 from input_deck import InputDeck
 from tiefmu.decks import abaqus
-from tiefmu.decks.element_properties import nodal
 
 E, NU, RHO = 2.0e11, 0.25, 8000.0
 A11, G, BULK = E / (1 - NU**2), E / 2.5, E / 1.5
@@ -19,23 +19,13 @@ def read(deck: InputDeck, tmp_path, nodes: dict, said: list | None = None):
     deck.nodes(nodes | TIE).elements("SFM3D3", "skin", {9999: (9001, 9002, 9003)}).elastic("steel", RHO, E, NU)
     deck.block("NSET, NSET=pin", (9004,)).tie("pin", "skin")
     found = abaqus.read(deck.write(tmp_path / "deck.inp"), "deck.inp")
-    values = nodal(found)
     if said is not None:
         said += found.warnings
     else:
         assert found.warnings == [
             "deck.inp: names no units; m, kg, s are taken, in which material 'steel' has 8000 kg/m3 and 2e+11 Pa"
         ]
-    return {
-        int(number): {
-            "m": values.mass[i],
-            "j": values.inertia[i],
-            "k": values.stiffness[i],
-            "kr": values.rotational_stiffness[i],
-            "rotates": bool(values.rotations[i]),
-        }
-        for i, number in enumerate(found.node_id)
-    }
+    return by_node(found)
 
 
 def close(found: dict, **wanted):

@@ -1,5 +1,6 @@
 """Abaqus and CalculiX: *TIE, its options, its surfaces."""
 
+import deck_checks
 import numpy as np
 import pytest
 from input_deck import InputDeck
@@ -37,13 +38,11 @@ def raw(made: InputDeck, tmp_path, wanted=None):
 
 
 def slaves(made: InputDeck, tmp_path) -> list:
-    found = raw(made, tmp_path)
-    return found.node_id[found.ties[0].slaves].tolist()
+    return deck_checks.slaves(raw(made, tmp_path))
 
 
 def faces(made: InputDeck, tmp_path) -> set:
-    found = raw(made, tmp_path)
-    return {frozenset(found.node_id[row[row >= 0]].tolist()) for row in found.ties[0].faces.nodes}
+    return deck_checks.faces(raw(made, tmp_path))
 
 
 def refused(made: InputDeck, tmp_path) -> str:

@@ -2,6 +2,7 @@
 
 import random
 
+import deck_checks
 import pytest
 from deck_cards import RadiossDeck
 from tiefmu import decks
@@ -149,54 +150,24 @@ def test_a_deck_without_ties(tmp_path):
     assert message(text, tmp_path) == "/INTER/TYPE2: the deck has no tie"
 
 
-BITS = [
-    b"",
-    b"-1",
-    b"999999999",
-    b"x",
-    b"\xff\xfe",
-    b"/",
-    b"/PART/9",
-    b"1e400",
-    b"nan",
-    b"0",
-    b"#",
-    b"  ",
-    b"\0",
-    b"1_0",
-]
+BITS = [*deck_checks.BITS, b"999999999", b"/", b"/PART/9", b"#"]
 
 
-def damaged(text: bytes, chance: random.Random) -> bytes:
-    lines = text.split(b"\n")
-    for _ in range(chance.randrange(1, 4)):
-        at = chance.randrange(len(lines))
-        line = lines[at]
-        kind = chance.randrange(8)
-        if kind == 0:
-            del lines[at]
-        elif kind == 1:
-            lines.insert(at, lines[chance.randrange(len(lines))])
-        elif kind == 2:
-            lines[at] = line[: chance.randrange(len(line) + 1)]
-        elif kind == 3:
-            start = chance.randrange(len(line) + 1)
-            lines[at] = line[:start] + chance.choice(BITS) + line[start:]
-        elif kind == 4 and len(line) >= 10:
-            start = chance.randrange(len(line) // 10) * 10
-            lines[at] = line[:start] + chance.choice(BITS).rjust(10)[:10] + line[start + 10 :]
-        elif kind == 5 and line.startswith(b"/"):
-            words = line.split(b"/")
-            words[chance.randrange(1, len(words))] = chance.choice(BITS)
-            lines[at] = b"/".join(words)
-        elif kind == 6 and line.startswith(b"/"):
-            lines[at] = line.rpartition(b"/")[0] or b"/"
-        else:
-            other = chance.randrange(len(lines))
-            lines[at], lines[other] = lines[other], lines[at]
-        if not lines:
-            lines = [b""]
-    return b"\n".join(lines)
+def a_word(line: bytes, chance: random.Random) -> bytes | None:
+    """Another word in a keyword."""
+    if not line.startswith(b"/"):
+        return None
+    words = line.split(b"/")
+    words[chance.randrange(1, len(words))] = chance.choice(BITS)
+    return b"/".join(words)
+
+
+def shorter(line: bytes, chance: random.Random) -> bytes | None:
+    """A keyword without its last word."""
+    return (line.rpartition(b"/")[0] or b"/") if line.startswith(b"/") else None
+
+
+OWN = [deck_checks.columns(10, BITS), a_word, shorter]
 
 
 def rich() -> bytes:
@@ -230,7 +201,7 @@ def test_the_rich_deck_is_sound(tmp_path):
 def test_random_damage(tmp_path, seed):
     chance, whole, path = random.Random(seed), rich(), tmp_path / "deck_0000.rad"
     for _ in range(60):
-        path.write_bytes(damaged(whole, chance))
+        path.write_bytes(deck_checks.damaged(whole, chance, BITS, OWN))
         try:
             decks.compiled(decks.read(path))
         except decks.SceneError as error:

@@ -2,6 +2,7 @@
 
 import random
 
+import deck_checks
 import pytest
 from dyna_cards import DynaDeck
 from tiefmu import decks
@@ -179,56 +180,19 @@ def test_elements_without_area(tmp_path):
     assert "element 1: its mass or stiffness would be infinite" in message(text, tmp_path)
 
 
-BITS = [
-    b"",
-    b"-1",
-    b"99999999",
-    b"x",
-    b"\xff\xfe",
-    b"*",
-    b"*PART",
-    b"1e400",
-    b"nan",
-    b"0",
-    b"$",
-    b"  ",
-    b"\0",
-    b"1_0",
-    b",",
-    b"&a",
-]
+BITS = [*deck_checks.BITS, b"99999999", b"*", b"*PART", b"$", b",", b"&a"]
 
 
-def damaged(text: bytes, chance: random.Random) -> bytes:
-    lines = text.split(b"\n")
-    for _ in range(chance.randrange(1, 4)):
-        at = chance.randrange(len(lines))
-        line = lines[at]
-        kind = chance.randrange(7)
-        if kind == 0:
-            del lines[at]
-        elif kind == 1:
-            lines.insert(at, lines[chance.randrange(len(lines))])
-        elif kind == 2:
-            lines[at] = line[: chance.randrange(len(line) + 1)]
-        elif kind == 3:
-            start = chance.randrange(len(line) + 1)
-            lines[at] = line[:start] + chance.choice(BITS) + line[start:]
-        elif kind == 4 and len(line) >= 8:
-            start = chance.randrange(len(line) // 8) * 8
-            lines[at] = line[:start] + chance.choice(BITS).rjust(8)[:8] + line[start + 8 :]
-        elif kind == 5 and line.startswith(b"*"):
-            words = line.split(b"_")
-            words[chance.randrange(len(words))] = chance.choice(
-                [b"ID", b"TITLE", b"SET", b"GENERAL", b"ADD", b"BEAM", b""]
-            )
-            lines[at] = b"_".join(words)
-        else:
-            other = chance.randrange(len(lines))
-            lines[at], lines[other] = lines[other], lines[at]
-        if not lines:
-            lines = [b""]
-    return b"\n".join(lines)
+def a_word(line: bytes, chance: random.Random) -> bytes | None:
+    """Another word in a keyword."""
+    if not line.startswith(b"*"):
+        return None
+    words = line.split(b"_")
+    words[chance.randrange(len(words))] = chance.choice([b"ID", b"TITLE", b"SET", b"GENERAL", b"ADD", b"BEAM", b""])
+    return b"_".join(words)
+
+
+OWN = [deck_checks.columns(8, BITS), a_word]
 
 
 def rich(form: str, folder) -> bytes:
@@ -290,7 +254,7 @@ def test_random_damage(tmp_path, seed):
     chance, path = random.Random(seed), tmp_path / "deck.k"
     whole = rich("comma" if seed % 2 else "fixed", tmp_path)
     for _ in range(60):
-        path.write_bytes(damaged(whole, chance))
+        path.write_bytes(deck_checks.damaged(whole, chance, BITS, OWN))
         try:
             if decks.is_deck(path):
                 decks.compiled(decks.read(path))

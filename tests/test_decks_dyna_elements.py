@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+from deck_checks import by_node
 from dyna_cards import DynaDeck
 from tiefmu import decks
 from tiefmu.decks import dyna
-from tiefmu.decks.element_properties import nodal
 
 E, NU, RHO = 2.0e11, 0.25, 8000.0
 A11, G, BULK = E / (1 - NU**2), E / 2.5, E / 1.5
@@ -17,17 +17,7 @@ def read(made: DynaDeck, tmp_path, nodes: dict):
     """The deck with a tie far away; returns values by node id, and the deck."""
     made.nodes(nodes | TIE).segments(1, [(9001, 9002, 9003, 9003)]).list_of("NODE", 1, [9004]).tie(1, 1, (4, 0))
     deck = dyna.read(made.write(tmp_path / "deck.k"), "deck.k")
-    values = nodal(deck)
-    found = {
-        int(number): {
-            "m": values.mass[i],
-            "j": values.inertia[i],
-            "k": values.stiffness[i],
-            "kr": values.rotational_stiffness[i],
-            "rotates": bool(values.rotations[i]),
-        }
-        for i, number in enumerate(deck.node_id)
-    }
+    found = by_node(deck)
     return found, deck
 
 

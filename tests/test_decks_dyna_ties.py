@@ -1,5 +1,6 @@
 """Tied contacts of LS-DYNA decks: kinds, sides, sets of all kinds, tolerances."""
 
+import deck_checks
 import numpy as np
 import pytest
 from dyna_cards import DynaDeck
@@ -28,13 +29,11 @@ def read(made: DynaDeck, tmp_path, **options):
 
 
 def slaves(made: DynaDeck, tmp_path) -> list:
-    found = dyna.read(made.write(tmp_path / "deck.k"), "deck.k")
-    return found.node_id[found.ties[0].slaves].tolist()
+    return deck_checks.slaves(dyna.read(made.write(tmp_path / "deck.k"), "deck.k"))
 
 
 def faces(made: DynaDeck, tmp_path) -> set:
-    found = dyna.read(made.write(tmp_path / "deck.k"), "deck.k")
-    return {frozenset(found.node_id[row[row >= 0]].tolist()) for row in found.ties[0].faces.nodes}
+    return deck_checks.faces(dyna.read(made.write(tmp_path / "deck.k"), "deck.k"))
 
 
 # kinds of contacts

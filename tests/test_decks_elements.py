@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 from deck_cards import RadiossDeck
+from deck_checks import by_node
 from tiefmu.decks import radioss
-from tiefmu.decks.element_properties import nodal
 
 E, NU, RHO = 2.0e11, 0.25, 8000.0
 A11, G, BULK = E / (1 - NU**2), E / 2.5, E / 1.5
@@ -24,17 +24,7 @@ def read(deck: RadiossDeck, tmp_path, nodes: dict):
     deck.elements("SH3N", 99, {9999: (9001, 9002, 9003)})
     deck.node_group(1, [9004]).surface(1, "PART", [99]).tie()
     found = radioss.read(deck.write(tmp_path / "deck_0000.rad"), "deck_0000.rad")
-    values = nodal(found)
-    return {
-        int(number): {
-            "m": values.mass[i],
-            "j": values.inertia[i],
-            "k": values.stiffness[i],
-            "kr": values.rotational_stiffness[i],
-            "rotates": bool(values.rotations[i]),
-        }
-        for i, number in enumerate(found.node_id)
-    }
+    return by_node(found)
 
 
 def base(**shell) -> RadiossDeck:

@@ -1,5 +1,6 @@
 """/INTER/TYPE2: its flags, its node groups and surfaces, sets of all kinds."""
 
+import deck_checks
 import numpy as np
 import pytest
 from deck_cards import RadiossDeck
@@ -33,13 +34,11 @@ def tie_of(made: RadiossDeck, tmp_path):
 
 
 def slaves(made: RadiossDeck, tmp_path) -> list:
-    found = radioss.read(made.write(tmp_path / "deck_0000.rad"), "deck_0000.rad")
-    return found.node_id[found.ties[0].slaves].tolist()
+    return deck_checks.slaves(radioss.read(made.write(tmp_path / "deck_0000.rad"), "deck_0000.rad"))
 
 
 def faces(made: RadiossDeck, tmp_path) -> set:
-    found = radioss.read(made.write(tmp_path / "deck_0000.rad"), "deck_0000.rad")
-    return {frozenset(found.node_id[row[row >= 0]].tolist()) for row in found.ties[0].faces.nodes}
+    return deck_checks.faces(radioss.read(made.write(tmp_path / "deck_0000.rad"), "deck_0000.rad"))
 
 
 def default_tie() -> RadiossDeck:

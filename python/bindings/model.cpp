@@ -4,12 +4,14 @@
 #include <nanobind/stl/vector.h>
 
 #include <memory>
+#include <optional>
 
 #include "../../fmu/resource.hpp"
 #include "../../modelDescription/variables.hpp"
 #include "../../modelDescription/xml.hpp"
 #include "../../src/compile.hpp"
 #include "../../src/inertia.hpp"
+#include "../../src/lumping.hpp"
 #include "../../src/segment.hpp"
 #include "../../src/stability.hpp"
 #include "bindings.hpp"
@@ -126,6 +128,16 @@ nb::list reportPorts(const Model& model) {
   return result;
 }
 
+nb::object reportLumping(const Model& model) {
+  const std::optional<LumpingError> found = lumpingError(model);
+  if (!found || model.settings.inertia != Inertia::lumped) return nb::none();
+  nb::dict d;
+  d["ratio"] = found->ratio;
+  d["segment"] = found->segment;
+  d["connected"] = found->connected;
+  return d;
+}
+
 nb::dict report(const Model& model) {
   nb::list warnings, notes, dropped;
   for (const Finding& f : model.findings) (f.kind == Finding::warning ? warnings : notes).append(f.text);
@@ -136,6 +148,7 @@ nb::dict report(const Model& model) {
   d["couplings"] = std::vector<std::string>(words<Coupling>.begin(), words<Coupling>.end());
   d["search_distance"] = model.searchDistance;
   d["springs"] = model.springs.size();
+  d["lumping"] = reportLumping(model);
   d["ports"] = reportPorts(model);
   d["dropped"] = dropped;
   d["left_out"] = numpy(model.leftOut);

@@ -6,7 +6,7 @@ import os
 import sys
 from pathlib import Path
 
-from . import __version__, advise, lumping, study
+from . import __version__, advise, study
 from .acceptance import command as accept_command
 from .arguments import check_folder_of, existing, is_fmu, positive, whole
 from .binaries import libraries, stale
@@ -18,7 +18,7 @@ from .models import fmu_of, show_warnings
 from .package import build
 from .platforms import BY_FOLDER
 from .plot import check_picture, plot
-from .report import counted, of_fmu, report, summary, text
+from .report import counted, lumping_line, of_fmu, report, summary, text
 from .results import check_format
 from .run import run
 from .sweep import command as sweep_command
@@ -169,7 +169,7 @@ def run_build(options: argparse.Namespace) -> None:
     systems = ", ".join(library.text for library in libraries(options.platforms))
     print(f"{fmu}: {summary(found)}, {fmu.stat().st_size / 1024:.0f} KiB, for {systems}")
     if found["lumping"]:
-        print(lumping.line(found["lumping"]))
+        print(lumping_line(found["lumping"]))
     if found["notes"]:
         print(f"{counted(len(found['notes']), 'note')} on the scene: tiefmu info {options.scene}")
 

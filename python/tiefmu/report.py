@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from . import _core, lumping
+from . import _core
 from .errors import UsageError
 from .scene import MOTIONS, Scene
 
@@ -26,8 +26,8 @@ def report(scene: Scene, positions: bool = False) -> dict:
     `added`: lumped mass and inertia on each master (theory 4). A step that nothing limits is 1e30; an infinite `cond`
     or `lambda` is null. `position`: of masters and points at the start, where they are at most MOST_PLACES, or
     if asked for by `positions`. `interface`: the variables, a row a kind.
-    `lumping`: see lumping.py; null where no master is free, no slave has mass, or inertia is
-    consistent.
+    `lumping`: {"ratio", "segment", "connected"}: how far lumped inertia is from the true one (src/lumping.hpp; ratio
+    null: infinite); null where no master is free, lumping is exact, or inertia is consistent.
     """
     found = scene.model.report()
     slaves, nodes = found["slaves"], found["nodes"]
@@ -51,11 +51,26 @@ def report(scene: Scene, positions: bool = False) -> dict:
         "stable_time_step": scene.start.get("stable_time_step").tolist()[0],
         "nodal_time_step": scene.start.get("nodal_time_step").tolist()[0],
         "integrator_limit": scene.start.integrator_limit,
-        "lumping": lumping.lumping(found) if scene.settings.inertia == "lumped" else None,
+        "lumping": lumping(found["lumping"]),
         "freedoms": freedoms(scene, nodes),
         "variables": variables,
         "interface": interface_rows(scene),
     } | ports
+
+
+def lumping(row: dict | None) -> dict | None:
+    return row and row | {"ratio": float(f"{row['ratio']:.6g}") if np.isfinite(row["ratio"]) else None}
+
+
+def lumping_line(row: dict) -> str:
+    price = "two to ten times" if row["connected"] else "one to five times"
+    ratio = (
+        "motions without any true energy" if row["ratio"] is None else f"up to {row['ratio']:.3g} times the true one"
+    )
+    return (
+        f"lumped inertia: kinetic energy of the free masters {ratio} (segment {row['segment']}); "
+        f'[model] inertia = "consistent" is exact, for {price} the time of a step'
+    )
 
 
 def ties(scene: Scene, found: dict) -> list[dict]:
@@ -287,7 +302,7 @@ def text(name: str, found: dict) -> str:
         "",
     ]
     if found.get("lumping"):  # FMUs of an earlier program have none
-        lines.append(lumping.line(found["lumping"]))
+        lines.append(lumping_line(found["lumping"]))
     lines.append(
         f"freedoms: {found['freedoms']['translations']} translations, {found['freedoms']['rotations']} rotations"
     )

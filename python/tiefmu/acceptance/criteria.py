@@ -10,7 +10,6 @@ from ..scene import read_toml
 from ..schema import Name, NotNegative, Positive, Table, Text, finite, found, is_number, parse_as, wrong
 
 GRADES = {"excellent": 0.94, "good": 0.8, "fair": 0.58}  # least overall ratings of ISO/TS 18571
-MEASURES = ["peak", "maximum", "minimum", "end", "time_of_peak", "impulse"]
 
 
 def window(value: Any) -> tuple[float, float]:

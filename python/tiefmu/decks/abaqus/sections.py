@@ -43,7 +43,6 @@ class Sections:
         self.sections: list[Section] = []
         self.known: dict[tuple, int] = {}
         self.without: dict[str, list] = {}
-        self.unfit: dict[int, list] = {}
         for scope, block in source.cards(*SECTIONS):
             name = block.need("ELSET")
             rows = source.rows(scope, name, block)

@@ -11,8 +11,8 @@ from typing import NoReturn
 
 import numpy as np
 
-from ..._core import SceneError
 from ...schema import shortened
+from ..card_block import CardBlock
 from ..numbers import column, real, whole
 from . import parameters
 
@@ -46,7 +46,7 @@ class Origin:
 
 
 @dataclass
-class Block:
+class Block(CardBlock):
     """A keyword without its star, e.g. SET_NODE_LIST, and its cards. title: it has _TITLE."""
 
     name: str
@@ -60,16 +60,8 @@ class Block:
     numbers: array = field(default_factory=lambda: array("q"))
 
     @property
-    def where(self) -> str:
-        return f"{self.file}: line {self.number}: *{shortened(self.name)}"
-
-    def at(self, card: int) -> str:
-        """How messages call a card."""
-        number = self.numbers[card] if card < len(self.numbers) else (self.numbers or [self.number])[-1]
-        return f"{self.file}: line {number}: *{shortened(self.name)}"
-
-    def fail(self, text: str, card: int | None = None) -> NoReturn:
-        raise SceneError(f"{self.where if card is None else self.at(card)}: {text}")
+    def called(self) -> str:
+        return f"*{shortened(self.name)}"
 
     @property
     def words(self) -> list[str]:

@@ -7,12 +7,12 @@ its first card since.
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import NoReturn
 
 import numpy as np
 
 from ..._core import SceneError
 from ...schema import shortened
+from ..card_block import CardBlock
 from ..numbers import column, real, whole
 
 MOST_INCLUDES = 1000
@@ -54,7 +54,7 @@ class Offsets:
 
 
 @dataclass
-class Block:
+class Block(CardBlock):
     """key: the keyword's words, e.g. ["INTER", "TYPE2", "7"]; file, number: where it stands; lines: its cards, as
     bytes; numbers: their lines; files: [(first card, file)] of those in an include."""
 
@@ -72,17 +72,11 @@ class Block:
         return "/" + "/".join(self.key)
 
     @property
-    def where(self) -> str:
-        return f"{self.file}: line {self.number}: {shortened(self.name)}"
+    def called(self) -> str:
+        return shortened(self.name)
 
-    def at(self, card: int) -> str:
-        """How messages call a card."""
-        number = self.numbers[card] if card < len(self.numbers) else (self.numbers or [self.number])[-1]
-        file = next((file for first, file in reversed(self.files) if first <= card), self.file)
-        return f"{file}: line {number}: {shortened(self.name)}"
-
-    def fail(self, text: str, card: int | None = None) -> NoReturn:
-        raise SceneError(f"{self.where if card is None else self.at(card)}: {text}")
+    def file_of(self, card: int) -> str:
+        return next((file for first, file in reversed(self.files) if first <= card), self.file)
 
     def word(self, place: int) -> str:
         """The keyword's word at `place`, e.g. TYPE2; '' where it has none."""
