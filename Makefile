@@ -30,21 +30,21 @@ demo: $(VENV)/installed
 	$(BIN)/tiefmu report scenes/bracket.toml -o out/bracket.html
 
 # A second thread of NumPy's BLAS beside two workers only waits.
-test: $(VENV)/installed tools
+test: $(VENV)/tested-with tools
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n 2
 	@if command -v chromium >/dev/null; then $(BIN)/python -m pytest -m browser; \
 	  else echo "chromium is not installed: make browser opens the report in it"; fi
 
-browser: $(VENV)/installed chromium
+browser: $(VENV)/tested-with chromium
 	$(BIN)/python -m pytest -m browser
 
-instructions: $(VENV)/installed valgrind
+instructions: $(VENV)/tested-with valgrind
 	$(BIN)/python -m pytest -m instructions
 
-lint: $(VENV)/installed
+lint: $(VENV)/tested-with
 	$(BIN)/python -m pytest tests/test_house.py
 
-format: $(VENV)/installed
+format: $(VENV)/tested-with
 	$(BIN)/clang-format -i $(shell find bench fmu modelDescription python src tests -name '*.?pp')
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
@@ -56,17 +56,17 @@ study: $(VENV)/installed
 	cp docs/study/speed-accuracy-bracket.svg docs/speed-accuracy.svg
 
 SEQUENCES ?= 100000
-sanitize: $(VENV)/installed
+sanitize: $(VENV)/tested-with
 	TIEFMU_SEQUENCES=$(SEQUENCES) $(BIN)/python -m pytest -s tests/test_sanitizers.py
 
 QUADS ?= 1000000
-projections: $(VENV)/installed
+projections: $(VENV)/tested-with
 	TIEFMU_QUADS=$(QUADS) $(BIN)/python -m pytest -s tests/test_projection.py
 
 # Clang brings libFuzzer.
 CLANG ?= $(or $(shell command -v clang++ || command -v clang++-14),clang++)
 FUZZ_SECONDS ?= 20
-fuzz: $(VENV)/installed
+fuzz: $(VENV)/tested-with
 	PATH=$(abspath $(BIN)):$$PATH cmake --preset fuzz -DCMAKE_CXX_COMPILER=$(CLANG) -DPython_EXECUTABLE=$(abspath $(BIN)/python)
 	PATH=$(abspath $(BIN)):$$PATH cmake --build --preset fuzz
 	for input in resource state; do \
@@ -76,7 +76,7 @@ fuzz: $(VENV)/installed
 	done
 	$(BIN)/python tests/fuzz/scenes.py --seconds $(FUZZ_SECONDS) --first $$(date +%s)
 
-bench: $(VENV)/installed valgrind
+bench: $(VENV)/tested-with valgrind
 	$(BIN)/python bench/run.py
 
 $(VENV)/built-with: pyproject.toml
@@ -86,7 +86,12 @@ $(VENV)/built-with: pyproject.toml
 	touch $@
 
 $(VENV)/installed: $(VENV)/built-with $(SOURCES)
-	$(BIN)/python -m pip install --quiet --no-build-isolation --editable '.[test,dev]'
+	$(BIN)/python -m pip install --quiet --no-build-isolation --editable '.[accept,report]'
+	touch $@
+
+# What tests and contributors need besides.
+$(VENV)/tested-with: $(VENV)/installed
+	$(BIN)/python -m pip install --quiet --group test --group dev
 	touch $@
 
 PLATFORMS ?= linux64 win64
