@@ -1,6 +1,7 @@
 """`tiefmu advise` on every example scene: what it says is run from the scene it wrote, and its error found anew."""
 
 import itertools
+import re
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,7 @@ from conftest import toml
 from tiefmu import advise as advising
 from tiefmu.cli import main
 from tiefmu.signals import inputs_beside
-from tiefmu.study import motion, speed_accuracy_runs
+from tiefmu.study import host_modes, motion, speed_accuracy_runs, stability_map
 from tiefmu.study.motion import Signals
 from tiefmu.study.variants import Source
 
@@ -198,10 +199,10 @@ def test_mass_ratio_is_that_of_theory(tmp_path):
         "tie": [{"segments": "all", "slaves": [101]}],
     }
     (tmp_path / "a.toml").write_text(toml(scene))
-    assert advising.mass_ratio(Source(tmp_path / "a.toml")) == pytest.approx(6 / 8, rel=1e-12)
+    assert host_modes.ratios(Source(tmp_path / "a.toml")).full == pytest.approx(6 / 8, rel=1e-12)
     scene["node"][0]["mass"] = 0.0
     (tmp_path / "a.toml").write_text(toml(scene))
-    assert advising.mass_ratio(Source(tmp_path / "a.toml")) == np.inf
+    assert host_modes.ratios(Source(tmp_path / "a.toml")).full == np.inf
 
 
 def test_a_larger_step_than_advised_breaks_the_tolerance():
@@ -228,3 +229,79 @@ def test_bad_input_is_one_line(tmp_path, capsys):
     with pytest.raises(SystemExit) as stop:
         main(["advise", str(spinning), "--tolerance", "-1"])
     assert stop.value.code == 2
+
+
+def driven(tmp_path, mass=6.0, host=2.0, **node) -> Path:
+    """A slave in the middle of four masters of the host."""
+    scene = {
+        "mesh": {
+            "nodes": [[1, 0, 0, 0], [2, 1, 0, 0], [3, 1, 1, 0], [4, 0, 1, 0], [101, 0.5, 0.5, 0]],
+            "segments": [[1, 1, 2, 3, 4]],
+        },
+        "node": [{"nodes": "all", "mass": host} | node, {"nodes": [101], "mass": mass}],
+        "tie": [{"segments": "all", "slaves": [101]}],
+    }
+    (tmp_path / "a.toml").write_text(toml(scene))
+    return tmp_path / "a.toml"
+
+
+@pytest.mark.parametrize("stiffness", ["option", "scene"])
+def test_a_host_gets_the_mode_whose_point_is_green(stiffness, tmp_path, capsys):
+    """r = 30 at H omega = 0.1, omega^2 = K/M: what is said is the point of the map there."""
+    path = driven(tmp_path, 240.0, **({} if stiffness == "option" else {"stiffness": 5e5}))
+    given = ["--host-stiffness", "5e5"] if stiffness == "option" else []
+    assert main(["advise", str(path), "--host-step", "2e-4", *given, "--tolerance", "1e-2"]) == 0
+    said = capsys.readouterr().out.splitlines()
+    assert said[1] == "host: step 0.0002 s, H omega = 0.1, tied mass over the host's r = 30"
+    for line, mode in zip(said[2:], stability_map.MODES):
+        point = stability_map.point(mode.name, 30.0, 0.1)
+        assert line.split()[0] == mode.name and line.endswith("green") == point.green
+        assert ("unstable" in line) == (not point.stable)
+    green = [mode.name for mode in stability_map.MODES if stability_map.point(mode.name, 30.0, 0.1).error < 1e-2]
+    assert said[-1].startswith(f"reaction: {green[0]}, ") and green[0] == "full-closed-linear"
+
+
+def test_no_mode_for_a_step_that_is_too_long(tmp_path, capsys):
+    path = driven(tmp_path, 240.0)
+    assert main(["advise", str(path), "--host-step", "2e-2", "--host-stiffness", "5e5"]) == 0
+    said = capsys.readouterr().out.splitlines()
+    assert said[-2] == "reaction: none is stable and right to 10 % at this step"
+    step = float(re.search(r"at ([\d.e-]+) s$", said[-1])[1])
+    assert step < 2e-2 and stability_map.point(said[-1].split()[4], 30.0, 500 * step).green
+
+
+def test_the_mode_is_written(tmp_path, capsys):
+    path = driven(tmp_path, 24.0)
+    (tmp_path / "a.csv").write_text("time,master[1].v[3],slave[1].f[3]\n0,0,0\n0.01,1,5\n")
+    new = tmp_path / "new.toml"
+    arguments = ["advise", str(path), "--host-step", "2e-6", "--host-stiffness", "5e5", "--write", str(new)]
+    assert main([*arguments, "--tolerance", "5e-3"]) == 0
+    assert "reaction: split, " in capsys.readouterr().out
+    assert tomllib.loads(new.read_text())["model"] == {
+        "inertia": "consistent",
+        "geometry": tomllib.loads(new.read_text())["model"]["geometry"],
+        "reaction": "split",
+    }
+
+
+def test_a_deck_gets_advice(capsys):
+    deck = SCENES[0].parent / "pin_weld.rad"
+    assert main(["advise", str(deck), "--host-step", "1e-6"]) == 0
+    said = capsys.readouterr().out
+    assert "host: step 1e-06 s" in said and "freedoms: " in said
+    assert main(["advise", str(deck), "--write", "new.toml"]) == 2
+    assert "import it first" in capsys.readouterr().err
+
+
+def test_hosts_that_nothing_can_be_said_of(tmp_path, capsys):
+    spinning = next(path for path in SCENES if path.stem == "spinning")
+    heavy = next(path for path in SCENES if path.stem == "heavy_slave")
+    for arguments, said in [
+        ([spinning, "--host-step", "1e-5"], "no master is driven"),
+        ([heavy, "--host-step", "1e-5"], "no stiffness of the host is known"),
+        ([heavy, "--host-stiffness", "1e5"], "needs --host-step"),
+        ([driven(tmp_path, host=0.0), "--host-step", "1", "--host-stiffness", "1"], "has no mass"),
+    ]:
+        assert main(["advise", *map(str, arguments)]) == 2
+        error = capsys.readouterr().err
+        assert said in error and error.startswith("error: ") and error.count("\n") == 1

@@ -277,13 +277,3 @@ def test_two_builds_are_the_same_and_a_name_changes_the_guid(tmp_path):
         for k, scene in enumerate((made, moved))
     }
     assert len(guids) == 2
-
-
-@pytest.mark.parametrize("command", [["advise", "weld.toml"], ["study", "speed-accuracy", "weld.toml"]])
-def test_advice_and_studies_say_that_they_take_no_ports(command, scene_file, capsys):
-    scene_file(case_scene((("default", True, "lumped", "loads", "finite"), "driven")))
-    assert main(command) == 2
-    assert capsys.readouterr().err == (
-        "error: weld.toml: interface: ports: advice and studies move and load the nodes one "
-        "by one; leave the ports out of the scene they look at\n"
-    )

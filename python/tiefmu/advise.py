@@ -11,11 +11,12 @@ from .arguments import check_folder_of, positive
 from .errors import Diverged, SceneError, UsageError
 from .scene_file import toml_text
 from .signals import inputs_beside
-from .study import reference
+from .study import host_modes, reference
 from .study.driven import METHODS as SAMPLINGS
 from .study.driven import SAMPLES, DrivenRun, HeavyRun
 from .study.motion import FreeRun, Signals
 from .study.speed_accuracy_runs import intervals
+from .study.stability_map import BY_NAME
 from .study.variants import METHODS, Source, Variant, compiles
 
 SAFETY = 0.9  # of the stability limit: no step above it is advised
@@ -29,15 +30,26 @@ def add_parser(commands):
         help="say what a scene needs and no more",
         description="Measures error and cost of every model and method that the scene allows, and names the cheapest "
         "whose error stays under the tolerance: relative L2 over the whole run, of the slaves' velocities; of the "
-        "reactions too where every master is driven.",
+        "reactions too where every master is driven. With --host-step also: which way of coupling is stable and right "
+        "for a host with the masses of the scene.",
+        epilog="example: tiefmu advise weld.toml --tolerance 1e-3 --host-step 1e-6 --host-stiffness 3e7",
     )
-    parser.add_argument("scene", metavar="SCENE", help="scene file (TOML)")
+    parser.add_argument("scene", metavar="SCENE", help="scene file (TOML) or deck")
     parser.add_argument("--tolerance", metavar="E", type=positive, default=1e-3, help="relative error (default: 1e-3)")
     parser.add_argument(
         "--input",
         metavar="CSV",
         type=Path,
         help="inputs over time, as for `tiefmu run` (default: NAME.csv beside NAME.toml, if there)",
+    )
+    parser.add_argument(
+        "--host-step", metavar="H", type=positive, help="communication step of the host that moves the masters, s"
+    )
+    parser.add_argument(
+        "--host-stiffness",
+        metavar="K",
+        type=positive,
+        help="of a master on what holds it in the host, N/m (default: stiffness of the scene's nodes)",
     )
     parser.add_argument("--write", metavar="NEW", type=Path, help="write the scene as advised")
     parser.set_defaults(command=command)
@@ -46,8 +58,22 @@ def add_parser(commands):
 def command(options):
     if options.write:
         check_folder_of(options.write)
+    if options.host_stiffness and not options.host_step:
+        raise UsageError("--host-stiffness: needs --host-step, the step of that host")
     source = Source(options.scene)
-    advice = advise(source, options.input or inputs_beside(options.scene), options.tolerance)
+    if options.write and source.imported:
+        raise UsageError(f"{options.write}: a deck is no scene to change; import it first: tiefmu import {source.file}")
+    host = options.host_step and host_modes.judge(source, options.host_step, options.host_stiffness, options.tolerance)
+    inputs = options.input or inputs_beside(options.scene)
+    if host and not inputs and not source.any_free and not options.write:
+        print(
+            "\n".join(
+                [f"{source.file}: no input, so models and steps are not measured", *host.lines(options.tolerance)]
+            )
+        )
+        return
+    advice = advise(source, inputs, options.tolerance)
+    advice.host = host
     print("\n".join(advice.lines(source)))
     if options.write:
         options.write.write_text(written(source, advice, options), encoding="utf-8")
@@ -86,6 +112,7 @@ class Advice:
     models: list[tuple[Variant, float]]  # (variant, model error) of every model, cheapest first
     mass_ratio: float  # r of the driven masters, nan: none
     limit: float  # stability limit of the chosen method, s
+    host: host_modes.Verdict | None = None
 
     def lines(self, source) -> list[str]:
         c = self.choice
@@ -132,7 +159,9 @@ class Advice:
             "CPU time"
             for other in self.others[:4]
         ]
-        if not np.isnan(self.mass_ratio):
+        if self.host:
+            lines += self.host.lines(self.tolerance)
+        elif not np.isnan(self.mass_ratio):
             lines.append(self.reaction_line(c))
         return lines
 
@@ -145,7 +174,10 @@ class Advice:
             if not r < 1
             else f"full would be stable for a held force (r = {ratio} < 1), but not at r >= 1/2 with BDF2 velocities"
         )
-        return f"reaction: {c.reaction}, stable for any host; {full}"
+        stable = (
+            "for any host" if c.reaction == "loads" else "for a host without springs; --host-step says for which others"
+        )
+        return f"reaction: {c.reaction}, stable {stable}; {full}"
 
 
 def describe(c: Choice) -> str:
@@ -159,8 +191,8 @@ def error_text(error: float) -> str:
 
 def advise(source, inputs: Path | None, tolerance: float) -> Advice:
     """Raises SceneError, and UsageError where nothing reaches the tolerance."""
-    signals = Signals.read(source.scene, inputs)
-    ratio = mass_ratio(source) if source.any_driven else np.nan
+    signals = Signals.read(source.own, inputs)
+    ratio = host_modes.ratios(source).full if source.any_driven else np.nan
     search = (FreeSearch if source.any_free else DrivenSearch)(source, signals, tolerance, ratio)
     good, tried = [], []
     for variant, error in search.models:
@@ -182,38 +214,6 @@ def advise(source, inputs: Path | None, tolerance: float) -> Advice:
     return Advice(
         tolerance, best, [choice for choice in good if choice is not best], search.models, ratio, search.limit(best)
     )
-
-
-def mass_ratio(source) -> float:
-    """Largest eigenvalue of (host's mass)^-1 (mass that the tie adds), theory 5; inf where a host node has none."""
-    scene = source.build(Variant())
-    nodes, simulation = scene.model.report()["nodes"], scene.simulation()
-    simulation.initialise(0.0)
-    driven, rotating = np.flatnonzero(nodes["motion"] == 0), nodes["rotating"]
-    unknowns = [("acceleration", i, k) for i in driven for k in range(3)]
-    unknowns += [("angular_acceleration", i, k) for i in driven if i < rotating for k in range(3)]
-    own = np.array([(nodes["mass"] if field == "acceleration" else nodes["inertia"])[i] for field, i, _ in unknowns])
-
-    def reaction():
-        loads = {"acceleration": simulation.get("reaction_force")}
-        if rotating:
-            loads["angular_acceleration"] = simulation.get("reaction_moment")
-        return np.array([loads[field][i, k] for field, i, k in unknowns])
-
-    zero, columns = reaction(), []
-    for field, i, k in unknowns:
-        a = np.zeros((len(nodes["id"]) if field == "acceleration" else rotating, 3))
-        a[i, k] = 1.0
-        simulation.set(field, a)
-        columns.append(zero - reaction())
-        simulation.set(field, 0 * a)
-    tied = np.array(columns).T
-    used = np.abs(tied).max(axis=0) > 1e-12 * max(np.abs(tied).max(initial=0.0), 1e-300)
-    if not used.any():
-        return 0.0
-    if not own[used].all():
-        return np.inf
-    return float(np.abs(np.linalg.eigvals(tied[np.ix_(used, used)] / own[used, None])).max())
 
 
 class Search(ABC):
@@ -352,12 +352,13 @@ def written(source, advice: Advice, options) -> str:
     """The scene file with what was advised in place of what it had."""
     c = advice.choice
     tables = source.changed(c.variant)
-    if source.any_driven:
-        tables.model.reaction = c.reaction
     raw = tables.model_dump(exclude_unset=True, exclude_none=True)
     raw.setdefault("model", {}).update(inertia=c.variant.inertia, geometry=c.variant.geometry)
     if source.any_driven:
         raw["model"]["reaction"] = c.reaction
+        chosen = advice.host and advice.host.chosen and BY_NAME[advice.host.chosen.mode].reaction
+        if chosen:
+            raw["model"].update(reaction=chosen, inertia="lumped" if chosen == "loads" else "consistent")
     if not c.driven:
         per = source.units.si("time_step", 1.0)
         raw.setdefault("integrator", {}).update(method=c.method, time_step=float(c.step / per), safety=SAFETY)

@@ -177,7 +177,11 @@ def run_build(options: argparse.Namespace) -> None:
 def run_info(options: argparse.Namespace) -> None:
     if options.vtu:
         check_folder_of(options.vtu)
-    found = of_fmu(existing(options.model)) if is_fmu(options.model) else report(load(options.model))
+    found = (
+        of_fmu(existing(options.model))
+        if is_fmu(options.model)
+        else report(load(options.model), positions=bool(options.vtu))
+    )
     if options.vtu:
         write_ties(found, options.vtu, options.fields)
     if options.json:
@@ -198,8 +202,10 @@ def run_run(options: argparse.Namespace) -> None:
     if options.plot:
         check_picture(options.plot)
     pvd = (options.pvd, options.frames) if options.pvd else None
-    with fmu_of(options.model, positions=pvd is not None) as fmu:
-        result, found = run(fmu, options.stop_time, options.step, options.input, options.model, options.output, pvd)
+    with fmu_of(options.model, positions=pvd is not None) as (fmu, scene):
+        result, found = run(
+            fmu, options.stop_time, options.step, options.input, options.model, options.output, pvd, scene
+        )
     if options.plot:
         plot(result, options.plot, Path(options.model).stem)
     print(

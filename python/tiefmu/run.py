@@ -11,8 +11,9 @@ import numpy as np
 from . import key_figures
 from .errors import RunError, UsageError
 from .fmu_instance import Fmu, Instance
-from .report import of_folder
+from .report import of_folder, report
 from .results import Kept, Result, writer
+from .scene import Scene
 from .signals import Experiment, Inputs, read_inputs
 from .view.vtk import PvdFile
 
@@ -40,13 +41,15 @@ def run(
     name: str | None = None,
     output: Path | None = None,
     pvd: tuple[Path, int] | None = None,
+    scene: Scene | None = None,
 ) -> tuple[Result, list[str]]:
     """Runs the FMU; its outputs, and the lines of key_figures.py.
 
     stop_time, s: by default the end of the input CSV, else the FMU's default experiment. step: communication step, s,
     by default the FMU's, but so small that the run has at least STEPS. inputs: CSV with `time` and names of inputs,
     linear in between; a time given twice is a jump. name: how messages call the FMU. output: file to write all rows to
-    while it runs (results.FORMATS); pvd: file and number of frames of the moving mesh (view/vtk.py).
+    while it runs (results.FORMATS); pvd: file and number of frames of the moving mesh (view/vtk.py); scene: of the FMU,
+    where it is at hand.
     Row k holds what the FMU answers at the end of step k, the inputs being those of the start of the step. Raises
     RunError, UsageError, OSError.
     """
@@ -60,10 +63,10 @@ def run(
             sinks.append(stack.enter_context(writer(output, outputs, {name: fmu.unit(name) for name in outputs})))
         moving = None
         if pvd:
-            found = of_folder(fmu.folder)
+            found = report(scene, positions=True) if scene else of_folder(fmu.folder)
             if found is None:
                 raise UsageError(f"{pvd[0]}: {fmu.name} was not made by tiefmu, so it does not say where its nodes are")
-            moving = PvdFile(pvd[0], fmu, found, outputs, plan, pvd[1])
+            moving = PvdFile(pvd[0], scene, found, outputs, plan, pvd[1])
             sinks.append(moving)
         instance = Instance(fmu, outputs)
         try:

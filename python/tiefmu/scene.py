@@ -49,6 +49,15 @@ class Scene:
         """A new simulation of this scene, as the FMU runs it; call `initialise(t)` first."""
         return _core.Simulation(self.model)
 
+    def hidden_positions(self) -> list[str]:
+        """What [interface] expose would have to name for the positions of all nodes and slaves to be known that are no
+        inputs; of those behind ports the FMU shows none all the same."""
+        shown = {block["name"] for block in self.start.variables}
+        found = self.model.report()
+        kinds = {"slave": len(found["slaves"]["id"]) > 0, "master": found["nodes"]["master"].any()}
+        kinds["point"] = (found["nodes"]["master"] == 0).any()
+        return [f"{kind}.r" for kind, there in kinds.items() if there and f"{kind}.r" not in shown]
+
 
 def one_line(message: str) -> str:
     """The same with control characters and the like, which names may hold, written as escapes."""

@@ -39,7 +39,7 @@ def add_parser(commands) -> None:
 def run_accept(options: argparse.Namespace) -> int:
     if options.junit:
         check_folder_of(options.junit)
-    with fmu_of(options.model) as path, Fmu(path, options.model) as fmu:
+    with fmu_of(options.model) as (path, _), Fmu(path, options.model) as fmu:
         criteria, folder, name = options.criteria, None, str(options.criteria)
         if criteria is None:
             criteria, name = fmu.folder / FOLDER / FILE, f"{options.model}: {FILE}"

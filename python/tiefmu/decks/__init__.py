@@ -7,6 +7,7 @@ segment; write.py puts it into files.
 
 import dataclasses
 import tempfile
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -114,17 +115,25 @@ def untangle(deck: Deck):
             )
 
 
-def load(path: Path, ties: list[str] | None = None, free: tuple[str, ...] = ()) -> Scene:
-    """The compiled Scene of a deck."""
-    return compiled(read(path, ties, free))
+def load(path: Path, ties: list[str] | None = None, free: tuple[str, ...] = (), positions: bool = False) -> Scene:
+    """The compiled Scene of a deck. positions: its FMU shows where its nodes are."""
+    found = read(path, ties, free)
+    scene = compiled(found)
+    return compiled(found, scene.hidden_positions()) if positions else scene
 
 
-def compiled(found: Imported) -> Scene:
+def tables(path: Path, folder: Path) -> dict:
+    """The tables of a deck's scene, whose mesh and node properties are written to `folder`."""
+    return write.files(read(path), folder, path.stem, to_keep=False)
+
+
+def compiled(found: Imported, expose: Sequence[str] = ()) -> Scene:
     path = Path(found.deck.file)
     with tempfile.TemporaryDirectory(prefix="tiefmu-") as folder:
-        tables = write.files(found, Path(folder), path.stem, to_keep=False)
+        made = schema.parse(write.files(found, Path(folder), path.stem, to_keep=False))
+        made.interface.expose += expose
         try:
-            scene = Scene(found.deck.file, path.stem, schema.parse(tables), Path(folder))
+            scene = Scene(found.deck.file, path.stem, made, Path(folder))
         except SceneError as error:
             raise SceneError(one_line(f"{found.deck.file}: {error}")) from None
     prefix = f"{found.deck.file}: "  # which whoever shows a scene's remarks adds

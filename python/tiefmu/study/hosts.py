@@ -7,6 +7,7 @@ Freedoms are the masters' translations, three each, then the rotations of those 
 """
 
 import ctypes
+import functools
 import tempfile
 from dataclasses import dataclass
 
@@ -111,6 +112,14 @@ class Tie:
         self.set_inputs()
         load[self.names.loaded] = self.loads_now()
         return load
+
+    def derivatives(self) -> np.ndarray:
+        """Of the loads by the accelerations, (freedoms, freedoms), at rest: kg, kg m, kg m2. Differences are exact but
+        for rounding, as loads are affine in accelerations; an importer asks fmi2GetDirectionalDerivative."""
+        n = self.names.freedoms
+        rest = np.zeros(n)
+        still = self.move(rest, rest, rest)
+        return np.array([self.move(rest, rest, one) - still for one in np.eye(n)]).T
 
 
 class InProcess(Tie):
@@ -260,96 +269,72 @@ class Masses:
         return np.moveaxis(exponential(generator)[which.ravel()][:, :2], 0, -1)
 
 
-class Coupling:
-    """Host and tie in turns, each H long: the tie answers the host's motion, the host moves on with that answer.
+class Exchange:
+    """Host and FMU in turns, each H long. A state is (rows, freedoms); `watched`: the row that tells growth."""
 
-    order: 0 load held, 1 linear, 2 quadratic extrapolation. differenced: the acceleration that the tie gets is the
-    second order backward difference (BDF2) of the velocities in place of the host's own. host: with the inertia that
-    the tie's `reaction` asks the host to carry.
-    """
+    rows: int
+    watched: int
 
-    def __init__(self, tie: Tie, host: Masses, step: float, order: int = 0, differenced: bool = False):
-        self.tie, self.host, self.size, self.order, self.differenced = tie, host, step, order, differenced
-        self.shift = host.propagator(step)
-        self.rows = 5 if differenced else 3 + order
+    def __init__(self, step: float, freedoms: int):
+        self.size, self.freedoms = step, freedoms
 
     def rest(self) -> np.ndarray:
-        return np.zeros((self.rows, len(self.host.mass)))
+        return np.zeros((self.rows, self.freedoms))
 
-    def load(self, state: np.ndarray) -> np.ndarray:
-        """What the tie answers at this state."""
-        u, v, a = state[:3]
-        if self.differenced:
-            a = (3 * v - 4 * state[3] + state[4]) / (2 * self.size)
-        return self.tie.move(u, v, a)
+    def following(self, state: np.ndarray) -> np.ndarray:
+        """The state H later, of motions about rest."""
+        raise NotImplementedError
 
-    def advance(self, state: np.ndarray, load: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The state H later, and the extrapolated load there."""
-        u, v = state[0], state[1]
-        scale = self.size**2 / self.host.mass
-        s = self.shift
-        end, once, twice = load, 0.0, 0.0
-        if self.order == 1:
-            once = load - state[3]
-        elif self.order == 2:
-            once = 1.5 * load - 2 * state[3] + 0.5 * state[4]
-            twice = 0.5 * (load + state[4]) - state[3]
-        following = np.empty_like(state)
-        hv, q = self.size * v, scale * load
-        following[0] = s[0, 0] * u + s[0, 1] * hv + s[0, 2] * q
-        following[1] = s[1, 0] * u + s[1, 1] * hv + s[1, 2] * q
-        if self.order:
-            end = load + once + twice
-            following[:2] += s[:, 3] * (scale * once) + s[:, 4] * (scale * twice)
-        following[1] /= self.size
-        following[2] = (end - self.host.stiffness * following[0] - self.host.damping * following[1]) / self.host.mass
-        if self.differenced:
-            following[3], following[4] = v, state[3]
-        elif self.order:
-            following[3] = load
-            if self.order == 2:
-                following[4] = state[3]
-        return following, end
+    def restart(self) -> None:
+        """The FMU back to time 0."""
+        raise NotImplementedError
+
+    def carry(self, state: np.ndarray, following: np.ndarray, time: float) -> None:
+        """Brings along what the FMU keeps beside the state. Raises Diverged."""
+
+    def units(self) -> np.ndarray:
+        """What turns each row of a state into a displacement."""
+        raise NotImplementedError
 
     def matrix(self) -> np.ndarray:
-        """The one-step map of small motions about rest, column by column through the tie's own answers; it is the whole
-        map where the tie keeps no state of its own (small geometry, positions as inputs, no free node)."""
-        rest = self.rest()
-        still = self.load(rest)
+        """The one-step map of small motions about rest, column by column through the FMU's own answers; it is the whole
+        map where the FMU keeps nothing beside the state (small geometry, and positions as inputs or no springs)."""
         columns = []
-        for k in range(rest.size):
-            state = rest.copy()
+        for k in range(self.rest().size):
+            state = self.rest()
             state.flat[k] = 1.0
-            columns.append(self.advance(state, self.load(state) - still)[0].ravel())
+            columns.append(self.following(state).ravel())
         return np.array(columns).T
 
-    def radius(self) -> float:
-        """Spectral radius of the one-step map. Freedoms without springs drift, which is no growth: their displacement
-        is left out."""
-        matrix, n = self.matrix(), len(self.host.mass)
+    def roots(self) -> np.ndarray:
+        """Eigenvalues of the one-step map. Freedoms without springs drift, which is no growth: their displacement is
+        left out."""
+        matrix, n = self.matrix(), self.freedoms
         drifting = np.flatnonzero(np.abs(matrix[n:, :n]).max(axis=0) == 0)
         kept = np.setdiff1d(np.arange(len(matrix)), drifting)
         matrix = matrix[np.ix_(kept, kept)]
         weight = np.repeat(self.units(), n)[kept]
-        return float(np.abs(np.linalg.eigvals(matrix * weight[:, None] / weight)).max())
+        return np.linalg.eigvals(matrix * weight[:, None] / weight)
+
+    def radius(self) -> float:
+        """Spectral radius of the one-step map."""
+        return float(np.abs(self.roots()).max())
 
     def growth(self, steps: int, seed: int = 1) -> float:
-        """Measured growth of the accelerations per step, from the second to the last quarter of a run from a random
-        state; infinite where they overflow, 0 where they vanish. A run ends early where only rounding is left."""
+        """Measured growth of the watched row per step, from the second to the last quarter of a run from a random
+        state; infinite where it overflows, 0 where it vanishes. A run ends early where only rounding is left."""
         rng = np.random.default_rng(seed)
-        state = rng.normal(size=(self.rows, len(self.host.mass))) / self.units()[:, None]
-        self.tie.restart()
-        still = self.load(self.rest())
+        self.restart()
+        state = rng.normal(size=(self.rows, self.freedoms)) / self.units()[:, None]
         peaks, first = np.zeros(4), 0.0
         for k in range(steps):
-            following = self.advance(state, self.load(state) - still)[0]
-            if self.tie.keeps_state:
-                try:
-                    self.tie.carry((state[1] + following[1]) / 2, k * self.size, self.size)
-                except Diverged:
-                    return float(np.inf)
+            try:
+                following = self.following(state)
+                self.carry(state, following, k * self.size)
+            except Diverged:
+                return float(np.inf)
             state = following
-            size = np.abs(state[2]).max()
+            size = np.abs(state[self.watched]).max()
             if not size < 1e200:
                 return float(np.inf)
             if k == 0:
@@ -359,7 +344,130 @@ class Coupling:
             peaks[4 * k // steps] = max(peaks[4 * k // steps], size)
         return float((peaks[3] / peaks[1]) ** (2 / steps)) if peaks[1] > 0 else 0.0
 
+
+class Coupling(Exchange):
+    """The tie answers the host's motion, the host moves on with that answer.
+
+    order: 0 load held, 1 linear, 2 quadratic extrapolation. lead: what is held is the load and so much of its last
+    change. closed: with reaction `full`, the load is that of the accelerations which it causes: one step of Newton's
+    method with the tie's derivatives of its loads, theory (5.7). differenced: the acceleration that the tie gets is the
+    second order backward difference (BDF2) of the velocities in place of the host's own. host: with the inertia that
+    the tie's `reaction` asks the host to carry.
+    """
+
+    watched = 2  # accelerations
+
+    def __init__(
+        self,
+        tie: Tie,
+        host: Masses,
+        step: float,
+        order: int = 0,
+        differenced: bool = False,
+        lead: float = 0.0,
+        closed: bool = False,
+    ):
+        super().__init__(step, len(host.mass))
+        self.tie, self.host, self.order, self.differenced, self.lead = tie, host, order, differenced, lead
+        self.shift = host.propagator(step)
+        self.rows = 5 if differenced else 4 if lead else 3 + order
+        self.closing = self.newton() if closed else None
+
+    def restart(self):
+        self.tie.restart()
+
+    @functools.cached_property
+    def still(self) -> np.ndarray:
+        """The loads at rest."""
+        return self.load(self.rest())
+
+    def newton(self) -> np.ndarray:
+        """What a gap between the tie's load and the one that the host has used adds to the load: J (M - J)^-1 with the
+        derivatives J of loads by accelerations, which are affine in them."""
+        jacobian = self.tie.derivatives()
+        return jacobian @ np.linalg.inv(np.diag(self.host.mass) - jacobian)
+
+    def load(self, state: np.ndarray) -> np.ndarray:
+        """What the tie answers at this state."""
+        u, v, a = state[:3]
+        if self.differenced:
+            a = (3 * v - 4 * state[3] + state[4]) / (2 * self.size)
+        load = self.tie.move(u, v, a)
+        if self.closing is None:
+            return load
+        used = self.host.mass * a + self.host.stiffness * u + self.host.damping * v
+        return load + self.closing @ (load - used)
+
+    def following(self, state: np.ndarray) -> np.ndarray:
+        return self.advance(state, self.load(state) - self.still)[0]
+
+    def carry(self, state, following, time):
+        if self.tie.keeps_state:
+            self.tie.carry((state[1] + following[1]) / 2, time, self.size)
+
+    def advance(self, state: np.ndarray, load: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The state H later, and the extrapolated load there."""
+        u, v = state[0], state[1]
+        scale = self.size**2 / self.host.mass
+        s = self.shift
+        used = load + self.lead * (load - state[3]) if self.lead else load
+        end, once, twice = used, 0.0, 0.0
+        if self.order == 1:
+            once = load - state[3]
+        elif self.order == 2:
+            once = 1.5 * load - 2 * state[3] + 0.5 * state[4]
+            twice = 0.5 * (load + state[4]) - state[3]
+        following = np.empty_like(state)
+        hv, q = self.size * v, scale * used
+        following[0] = s[0, 0] * u + s[0, 1] * hv + s[0, 2] * q
+        following[1] = s[1, 0] * u + s[1, 1] * hv + s[1, 2] * q
+        if self.order:
+            end = load + once + twice
+            following[:2] += s[:, 3] * (scale * once) + s[:, 4] * (scale * twice)
+        following[1] /= self.size
+        following[2] = (end - self.host.stiffness * following[0] - self.host.damping * following[1]) / self.host.mass
+        if self.differenced:
+            following[3], following[4] = v, state[3]
+        elif self.rows > 3:
+            following[3] = load
+            if self.order == 2:
+                following[4] = state[3]
+        return following, end
+
     def units(self) -> np.ndarray:
-        """What turns each row of a state into a displacement: 1, H, H^2, then H^2 / mass or H."""
-        memory = [self.size] * 2 if self.differenced else [self.size**2 / np.mean(self.host.mass)] * self.order
+        """1, H, H^2, then H^2 / mass or H."""
+        remembered = self.rows - 3
+        memory = [self.size] * 2 if self.differenced else [self.size**2 / np.mean(self.host.mass)] * remembered
         return np.array([1, self.size, self.size**2, *memory])
+
+
+class FreeMasters(Exchange):
+    """The FMU owns the masters: it gets what the host's springs and dampers do to them at the displacements that the
+    host has and the last velocities, and answers with the velocities after the step, with which the host moves its
+    displacements on. This is central difference in two programs, theory (5.10)."""
+
+    watched, rows = 1, 2  # displacements, velocities
+
+    def __init__(self, scene: Scene, stiffness: float, damping: float, step: float):
+        """stiffness, damping: of every master's ground spring, N/m and N s/m. The masters of the scene are free and
+        cannot turn."""
+        self.simulation = scene.simulation()
+        self.simulation.initialise(0.0)
+        super().__init__(step, self.simulation.get("velocity").size)
+        self.stiffness, self.damping = stiffness, damping
+
+    def restart(self):
+        self.simulation.reset()
+        self.simulation.initialise(0.0)
+
+    def following(self, state):
+        displacement, velocity = state
+        if not np.array_equal(self.simulation.get("velocity").ravel(), velocity):
+            self.simulation.set("velocity", velocity)  # of a column of the matrix, and at the start of a run
+        self.simulation.set("node_force", -self.stiffness * displacement - self.damping * velocity)
+        self.simulation.step(self.size)
+        after = self.simulation.get("velocity").ravel()
+        return np.array([displacement + self.size * after, after])
+
+    def units(self):
+        return np.array([1, self.size])

@@ -8,7 +8,7 @@ import numpy as np
 from .. import _core
 from ..loading import load
 from ..scene import Scene
-from .hosts import Coupling, InProcess, Masses
+from .hosts import Coupling, FreeMasters, InProcess, Masses
 
 GROWS = 1 + 1e-7  # growth a step that counts: above the rounding of an eigenvalue, below what 2 % off a limit makes
 
@@ -63,18 +63,18 @@ def edge(fails: Callable[[float], bool], closed: float, reach: float = 1.2, prec
 SQUARE = [[1, 0.0, 0.0, 0.0], [2, 1.0, 0.0, 0.0], [3, 1.0, 1.0, 0.0], [4, 0.0, 1.0, 0.0]]
 
 
-def plate(slave_mass: float, reaction: str, spring=(0.0, 0.0), place=(0.5, 0.5, 0.0), **tie) -> Scene:
-    """Four driven masters of 1 kg on a square of 1 m with a slave on it; spring: stiffness (N/m) and damping (N s/m) of
-    the slave to ground. The tie has no state of its own."""
+def plate(slave_mass: float, reaction: str, spring=(0.0, 0.0), place=(0.5, 0.5, 0.0), motion="driven", **tie) -> Scene:
+    """Four masters of 1 kg on a square of 1 m with a slave on it; spring: stiffness (N/m) and damping (N s/m) of the
+    slave to ground. Driven masters leave the tie without a state of its own; free ones have exact inertia."""
     scene = {
         "mesh": {"nodes": [*SQUARE, [5, *place]], "segments": [[1, 1, 2, 3, 4]]},
-        "node": [{"nodes": "all", "mass": 1.0}, {"nodes": [5], "mass": slave_mass}],
+        "node": [{"nodes": "all", "mass": 1.0, "motion": motion}, {"nodes": [5], "mass": slave_mass}],
         "tie": [{"name": "tie", "segments": "all", "slaves": [5], "search_distance": 10.0, **tie}],
         "model": {
             "reaction": reaction,
-            "inertia": "lumped" if reaction == "loads" else "consistent",
+            "inertia": "lumped" if reaction == "loads" and motion == "driven" else "consistent",
             "geometry": "small",
-            "position": "input",
+            "position": "input" if motion == "driven" else "integrated",
         },
     }
     if any(spring):
@@ -91,9 +91,10 @@ def coupled(
     omega: float = 0.0,
     zeta: float = 0.0,
     share: float = 1.0,
+    **closing,
 ) -> Coupling:
     """The scene's host at this step. omega, zeta: of each master alone on its ground spring (rad/s, 1); share: the part
-    of D that the host carries where the reaction asks for D (theory 5)."""
+    of D that the host carries where the reaction asks for D (theory 5); closing: lead and closed of `Coupling`."""
     tie = InProcess(scene)
     carried = 0.0 if reaction == "full" else share
     return Coupling(
@@ -102,7 +103,13 @@ def coupled(
         step,
         order,
         differenced,
+        **closing,
     )
+
+
+def owned(ratio: float, step: float, omega: float, zeta: float) -> FreeMasters:
+    """The plate with free masters and a slave of `ratio` times their mass; the host has their springs."""
+    return FreeMasters(plate(4 * ratio, "loads", motion="free"), omega**2, 2 * zeta * omega, step)
 
 
 # ---------------------------------------------------------------------------------------------------- free structures

@@ -13,6 +13,7 @@ import numpy as np
 
 from ..scene import Scene
 from ..signals import read_inputs
+from . import ports
 
 REPEATS = 3
 SHORTEST = 0.005  # s of CPU time that one measurement takes at least
@@ -58,7 +59,8 @@ class Signals:
 
     @classmethod
     def read(cls, scene: Scene, path) -> "Signals":
-        """The CSV of `tiefmu run`; None: nothing but the start values. Raises RunError."""
+        """The CSV of `tiefmu run`, inputs of ports as those of their nodes; None: nothing but the start values. Raises
+        RunError, UsageError."""
         if path is None:
             return cls(np.zeros(1), {})
         inputs, known = {}, []
@@ -67,15 +69,20 @@ class Signals:
             components = block["components"]
             for k, name in enumerate(scene.start.variable_names(number)):
                 known.append(_Variable(name, block["causality"]))
-                node = int(block["ids"][k // components]) if len(block["ids"]) else 0
-                inputs[name] = (node, short.removesuffix("_ext"), k % components)
+                owner = block["labels"] if block["prefix"] == "port" else block["ids"]
+                node = owner[k // components] if len(owner) else 0
+                inputs[name] = (
+                    node if isinstance(node, str) else int(node),
+                    short.removesuffix("_ext"),
+                    k % components,
+                )
         table = read_inputs(path, _Description(known))
         values = {}
         for name in (table.dtype.names or ())[1:]:
             node, quantity, k = inputs[name]
             if quantity in ("f", "t", "v", "w"):  # accelerations are taken as the slopes of the velocities
                 values.setdefault((node, quantity), np.zeros((len(table), 3)))[:, k] = table[name]
-        return cls(table["time"], values)
+        return cls(*ports.expand(scene, table["time"], values))
 
     @property
     def end(self) -> float:

@@ -79,7 +79,7 @@ def study(source, inputs: Path | None, table: Path, ladder: int = STEPS) -> tupl
     them and the reference's estimated error. Raises SceneError."""
     from tqdm import tqdm
 
-    signals = Signals.read(source.scene, inputs)
+    signals = Signals.read(source.own, inputs)
     plan = (FreeStudy if source.any_free else DrivenStudy)(source, signals, ladder)
     (table.parent / "machine.txt").write_text(machine() + "\n", encoding="utf-8")
     rows = []

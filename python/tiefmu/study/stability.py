@@ -12,6 +12,7 @@ from .limits import GROWS, Limit, Value, edge
 
 LIMIT_COLUMNS = ["item", "case", "parameter", "closed", "run", "radius", "stated", "deviation", "status"]
 VALUE_COLUMNS = ["item", "case", "parameter", "closed", "measured", "tolerance", "status"]
+REACH_COLUMNS = ["mode", "ratio", *(f"step_error_{error:g}" for error in stability_map.CLASSES)]
 BRACKET = 0.02  # how far a measured limit may lie from its closed form
 
 
@@ -38,8 +39,9 @@ def run(options) -> int:
         raise UsageError(f"--grid: expected 4 to 200 points, found {options.grid}")
     options.out.mkdir(parents=True, exist_ok=True)
     limits, values, points = stability_cases.limits(), [], []
-    limit_table, value_table = [], []
+    limit_table, value_table, reach_table = [], [], []
     total = len(limits) + len(stability_cases.VALUES) + len(stability_map.MODES) * options.grid**2
+    total += len(stability_map.MODES) * len(stability_map.REACH)
     interrupted = False
     with tqdm(total=total, delay=2, disable=None, leave=False) as bar:
         try:
@@ -51,6 +53,7 @@ def run(options) -> int:
                 value_table += map(value_row, values)
                 bar.update()
             points = stability_map.points(options.grid, bar.update)
+            reach_table = stability_map.reaches(bar.update)
         except KeyboardInterrupt:  # the rows finished so far are worth having
             interrupted = True
     write(options.out / "stability_limits.csv", LIMIT_COLUMNS, limit_table)
@@ -58,9 +61,10 @@ def run(options) -> int:
     if interrupted:
         return 130
     write(options.out / "stability_map.csv", list(asdict(points[0])), [list(asdict(p).values()) for p in points])
+    write(options.out / "stability_reach.csv", REACH_COLUMNS, reach_table)
     figures = [draw(limit_table, options.out), stability_map.draw(points, options.out)]
-    write_page(options.out / "stability.html", limit_table, value_table, points, figures)
-    show(limit_table, value_table, points)
+    write_page(options.out / "stability.html", limit_table, value_table, points, reach_table, figures)
+    show(limit_table, value_table, points, reach_table)
     print(f"wrote CSVs, charts and stability.html to {options.out}")
     return int(any(row[-1] != "ok" for row in limit_table + value_table))
 
@@ -102,7 +106,7 @@ def write(path: Path, header: list, rows: list):
         csv.writer(file, lineterminator="\n").writerows([header, *rows])
 
 
-def show(limit_table: list, value_table: list, points: list):
+def show(limit_table: list, value_table: list, points: list, reach_table: list):
     """Prints the tables."""
     for item, title in stability_cases.ITEMS.items():
         print(f"\n{item}. {title}")
@@ -117,6 +121,11 @@ def show(limit_table: list, value_table: list, points: list):
                 print(f"  {row[-1]:<4}{row[1]:<56} {row[2]:<24} closed {row[3]:<9.5g} measured: {row[4]:.5g}")
     both = [p for p in points if p.growth == p.growth]
     print(f"\nmap: {len(points)} points by spectral radius; of {len(both)} also decided by runs {agreeing(both)} agree")
+    print("\nLargest H omega for an error of 10 %, by the mass ratio r")
+    print(f"  {'mode':<20}" + "".join(f"{ratio:>9g}" for ratio in stability_map.REACH))
+    for mode in stability_map.MODES:
+        cells = [f"{row[-1]:>9.2g}" if row[-1] else f"{'none':>9}" for row in reach_table if row[0] == mode.name]
+        print(f"  {mode.name:<20}" + "".join(cells))
 
 
 def agreeing(points: list) -> int:
@@ -147,7 +156,9 @@ def draw(limit_table: list, folder: Path) -> Path:
     return folder / "stability_limits.svg"
 
 
-def write_page(path: Path, limit_table: list, value_table: list, points: list, figures: list[Path]):
+def write_page(
+    path: Path, limit_table: list, value_table: list, points: list, reach_table: list, figures: list[Path]
+) -> None:
     both = [p for p in points if p.growth == p.growth]
     page.write(
         path,
@@ -171,14 +182,26 @@ def write_page(path: Path, limit_table: list, value_table: list, points: list, f
                 "Map",
                 [
                     "Colours come from the eigenvalues of the one-step map: red where one is larger than 1, else the "
-                    "error of the worst mode's complex frequency against the monolithic system. Circles and crosses "
-                    f"are runs: of {len(both)}, {agreeing(both)} agree with the eigenvalues.",
+                    "error of the worst vibration's complex frequency against the monolithic system. Circles and "
+                    f"crosses are runs: of {len(both)}, {agreeing(both)} agree with the eigenvalues.",
                     "'loads' is always stable, and as wrong as its lumping. 'full' ends at r = 1 whatever the step. "
                     "'split' survives every ratio as the step goes to zero; at finite steps the held load lags behind "
                     "the host's springs, which feeds energy in, and the host's damping has to outweigh it: "
-                    "H omega < 2 zeta (1 + r)/(r (r + 1/2)). Linear extrapolation moves that limit far up.",
+                    "H omega < 2 zeta (1 + r)/(r (r + 1/2)). Linear extrapolation moves that limit far up. What stays "
+                    "at any ratio is 'full' closed by the tie's derivatives and extrapolated, and an FMU that owns the "
+                    "masters.",
                 ],
                 [("Stability and accuracy over mass ratio and communication step.", figures[1])],
+            ),
+            page.Section(
+                "Steps",
+                [
+                    "Largest H omega up to which a mode is stable and its error below 0.1, 1 and 10 %; 0: none "
+                    "from 1e-5 on; 3: all."
+                ],
+                [],
+                REACH_COLUMNS,
+                reach_table,
             ),
         ],
     )

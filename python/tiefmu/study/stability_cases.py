@@ -4,8 +4,9 @@ import numpy as np
 
 from .. import _core
 from ..loading import load
-from .limits import SQUARE, FreeRun, Limit, Value, coupled, plate
+from .limits import SQUARE, FreeRun, Limit, Value, coupled, owned, plate
 from .stability_geometry import clamp_values, drift_values, geometry_limits, orientation_values
+from .stability_map import worst
 
 ITEMS = {
     "1": "mass ratio, reaction 'full'",
@@ -16,6 +17,7 @@ ITEMS = {
     "6": "orientation",
     "7": "spinning offset",
     "8": "outside the segment, nearly collinear masters",
+    "9": "what couples heavy slaves",
 }
 
 
@@ -27,6 +29,7 @@ def limits() -> list[Limit]:
         *integrator_limits(),
         *hole_limits(),
         *geometry_limits(),
+        *heavy_limits(),
     ]
 
 
@@ -304,4 +307,41 @@ def hole_values() -> list[Value]:
     return [Value("5", case, "grows", expected, float(run.grows(step)), 0.0) for case, step, expected in cases]
 
 
-VALUES = [split_values, held_value, hole_values, orientation_values, drift_values, clamp_values]
+# ----------------------------------------------------------------------------------------- 9: what couples heavy slaves
+
+
+def heavy_limits() -> list[Limit]:
+    """The FMU owns the masters: central difference whatever the mass ratio (theory 5.10)."""
+    return [
+        Limit(
+            "9",
+            f"free, r = {r:g}, zeta = {zeta:g}",
+            "H omega",
+            2 * (np.sqrt(1 + zeta**2) - zeta),
+            lambda x, r=r, z=zeta: owned(r, x, 1.0, z).growth(4000) > 1,
+            lambda x, r=r, z=zeta: owned(r, x, 1.0, z).radius(),
+        )
+        for r, zeta in ((1.0, 0.02), (1000.0, 0.2))
+    ]
+
+
+def heavy_values() -> list[Value]:
+    """Errors of the worst vibration's frequency, undamped host: theory (5.8), (5.9), (5.10)."""
+    x, found = 1e-3, []
+    for r in (1.0, 10.0, 100.0):
+
+        def error(reaction, step, r=r, **way):
+            return worst(coupled(plate(4 * r, reaction), reaction, step, omega=1.0, **way).roots(), r, step, 0.0)
+
+        for name, step, closed, measured in (
+            ("full closed, held", x, x * r / (4 * np.sqrt(1 + r)), error("full", x, closed=True)),
+            ("full closed, linear", 50 * x, 5 / 24 * r / (1 + r) * (50 * x) ** 2,
+             error("full", 50 * x, order=1, closed=True)),
+            ("split, last change held too", x, x * r / (4 * (1 + r)), error("split", x, lead=1.0)),
+            ("free", 50 * x, (50 * x) ** 2 / 24, worst(owned(r, 50 * x, 1.0, 0.0).roots(), r, 50 * x, 0.0)),
+        ):  # fmt: skip
+            found.append(Value("9", f"{name}, r = {r:g}, H omega = {step:g}", "error", closed, measured, 0.05))
+    return found
+
+
+VALUES = [split_values, held_value, hole_values, orientation_values, drift_values, clamp_values, heavy_values]

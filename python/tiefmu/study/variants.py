@@ -3,13 +3,14 @@
 Every change gives a scene of the ordinary kind, so that all of them run in the same compiled solver.
 """
 
+import tempfile
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from .. import schema
+from .. import decks, schema
 from .._core import SceneError
 from ..scene import MOTIONS, NODE_VALUES, Assembly, Scene, read_toml
 from ..units import DIMENSIONS, Units
@@ -66,30 +67,40 @@ def in_si(tables: schema.SceneTables) -> schema.SceneTables:
 
 
 class Source:
-    """A scene file as read, before it is compiled: `variant` and `Scene` come from it. Raises SceneError."""
+    """A scene file or a deck as read, before it is compiled. own: the scene as the file has it; scene, and all that is
+    built: its nodes one by one, without ports. Raises SceneError."""
 
     def __init__(self, path):
         self.file, self.name, self.folder = str(path), Path(path).stem, Path(path).parent
+        self.imported: tempfile.TemporaryDirectory | None = None  # what was made of a deck
         try:
-            self.tables = schema.parse(read_toml(Path(path)))
-            if self.tables.interface.ports:
-                raise SceneError(
-                    "interface: ports: advice and studies move and load the nodes one by one; leave the ports "
-                    "out of the scene they look at"
-                )
+            if decks.is_deck(Path(path)):
+                self.imported = tempfile.TemporaryDirectory(prefix="tiefmu-")
+                self.folder = Path(self.imported.name)
+                self.tables = schema.parse(decks.tables(Path(path), self.folder))
+            else:
+                self.tables = schema.parse(read_toml(Path(path)))
         except SceneError as error:
             raise SceneError(f"{self.file}: {error}") from None
-        self.scene = self.compile(self.tables)  # as it is: what is wrong with it shows here
+        self.own = self.compile(self.tables, with_ports=True)  # as it is: what is wrong with it shows here
+        self.scene = self.compile(self.tables) if self.tables.interface.ports else self.own
         self.units = Units.of(self.tables.units)
         nodes = self.scene.model.report()["nodes"]
         moving = {MOTIONS[m] for m in nodes["motion"].tolist()}
         self.any_free, self.any_driven = "free" in moving, "driven" in moving
         self.formulations = {tie.formulation for tie in self.tables.tie}
 
-    def compile(self, tables: schema.SceneTables) -> Scene:
+    def compile(self, tables: schema.SceneTables, with_ports: bool = False) -> Scene:
         """Raises SceneError with the file's name."""
+        tables = tables.model_copy(deep=True)
+        if not with_ports:
+            expose, hide = (
+                [name for name in names if not name.startswith("port.")]
+                for names in (tables.interface.expose, tables.interface.hide)
+            )
+            change(tables.interface, ports=[], expose=expose, hide=hide)
         try:
-            return Scene(self.file, self.name, tables.model_copy(deep=True), self.folder)
+            return Scene(self.file, self.name, tables, self.folder)
         except SceneError as error:
             raise SceneError(f"{self.file}: {error}") from None
 

@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import UsageError
-from ..fmu_instance import Fmu
-from ..scene import MOTIONS
+from ..scene import MOTIONS, Scene
 from ..schema import suggestion
 from ..signals import Experiment
 from .geometry import Geometry
@@ -80,14 +79,13 @@ def write_ties(found: dict, path: Path, fields: list[str] | None = None) -> None
     mesh(geometry, points, cell_data=cell_data, point_data=point_data).write(path, file_format="vtu")
 
 
-class PvdFile:
-    """Takes a run block by block: a VTU file for every k-th row in a folder beside PATH, and PATH, a collection of them
-    with their times. Points move; fields velocity (m/s) of nodes and slaves, reaction (N) of masters."""
+class Columns:
+    """Where things are and how they move, from the rows of a run: outputs, inputs, and what stays at the start."""
 
-    def __init__(self, path: Path, fmu: Fmu, found: dict, names: list[str], plan: Experiment, frames: int = FRAMES):
-        """found: the FMU's report; names: its outputs. Raises UsageError."""
-        self.path, self.inputs, self.geometry = path, plan.inputs, Geometry(found)
-        rows = self.geometry.rows
+    def __init__(self, path: Path, geometry: Geometry, found: dict, names: list[str], plan: Experiment):
+        """names: of the outputs. Raises UsageError where they do not say."""
+        self.inputs = plan.inputs
+        rows = geometry.rows
         prefixes = ["master"] * len(found["masters"]) + ["point"] * len(found["points"])
         nodes = [f"{prefix}[{row['number']}]" for prefix, row in zip(prefixes, rows)]
         slaves = [f"slave[{row['number']}]" for row in found["slaves"]]
@@ -95,13 +93,13 @@ class PvdFile:
         moving = [name for name, row in zip(nodes, rows) if row["motion"] != "fixed"] + slaves
         hidden = next((name for name in moving if f"{name}.r[1]" not in known), None)
         if hidden and "ports" in found:
-            raise UsageError(f"{path}: nodes behind ports show no positions; leave the ports out of the scene")
+            raise UsageError(f"{path}: nodes behind ports show no positions in an FMU; give its scene")
         if hidden:
             kind = hidden.split("[")[0]
             raise UsageError(f'{path}: the FMU shows no {hidden}.r; expose = ["{kind}.r"] in [interface] of its scene')
         # A frame is looked up in the row, the inputs, and what is shown where neither has it.
         still = np.zeros((len(nodes) + len(slaves), 3))
-        start = np.vstack([self.geometry.positions, self.geometry.slaves])
+        start = np.vstack([geometry.positions, geometry.slaves])
         self.constants = np.concatenate([start.ravel(), still.ravel()])
         columns = {name: 1 + k for k, name in enumerate(names)}
         columns |= {name: 1 + len(names) + k for k, name in enumerate(self.inputs.names)}
@@ -113,7 +111,72 @@ class PvdFile:
                 for i in range(3):
                     place[3 * k + i] = columns.get(f"{name}.{quantity}[{i + 1}]", place[3 * k + i])
             self.places[quantity] = place.reshape(-1, 3)
+
+    def follow(self, row: np.ndarray) -> None:
+        """Every row of the run, in order."""
+
+    def look(self, row: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Positions, velocities and reactions of the nodes, then the slaves, (nodes + slaves, 3), at the row followed
+        last."""
+        values = np.concatenate([row, self.inputs.at(row[:1])[0], self.constants])
+        r, v, f = (values[self.places[quantity]] for quantity in "rvf")
+        return r, v, f
+
+
+class Companion:
+    """The same from a simulation of the scene in this process, stepped as the FMU is: for nodes behind ports."""
+
+    def __init__(self, scene: Scene, found: dict, plan: Experiment):
+        """scene: with positions shown (loading.load)."""
+        self.simulation, self.inputs, self.time = scene.simulation(), plan.inputs, plan.start
+        self.simulation.initialise(plan.start)
+        rows = scene.model.report()
+        node = {int(number): k for k, number in enumerate(rows["nodes"]["id"])}
+        slave = {int(number): k for k, number in enumerate(rows["slaves"]["id"])}
+        self.nodes = [node[row["id"]] for row in found["masters"] + found["points"]]
+        self.slaves = [slave[row["id"]] for row in found["slaves"]]
+
+    def follow(self, row):
+        time = float(row[0])
+        if self.inputs.names:
+            self.simulation.set_values(self.inputs.names, self.inputs.at(np.array([self.time]))[0])
+        if time > self.time:
+            self.simulation.step(time - self.time)
+        self.time = time
+
+    def look(self, row):
+        def of(node_field: str, slave_field: str) -> np.ndarray:
+            return np.vstack(
+                [self.simulation.get(node_field)[self.nodes], self.simulation.get(slave_field)[self.slaves]]
+            )
+
+        if self.inputs.names:
+            self.simulation.set_values(self.inputs.names, self.inputs.at(row[:1])[0])
+        r, v = of("position", "slave_position"), of("velocity", "slave_velocity")
+        f = self.simulation.get("reaction_force")[self.nodes]
+        return r, v, np.vstack([f, np.zeros((len(self.slaves), 3))])
+
+
+class PvdFile:
+    """Takes a run block by block: a VTU file for every k-th row in a folder beside PATH, and PATH, a collection of them
+    with their times. Points move; fields velocity (m/s) of nodes and slaves, reaction (N) of masters."""
+
+    def __init__(
+        self, path: Path, scene: Scene | None, found: dict, names: list[str], plan: Experiment, frames: int = FRAMES
+    ):
+        """scene: None where there is but an FMU; found: a report with positions; names: the FMU's outputs. Raises
+        UsageError."""
+        from tqdm import tqdm
+
+        self.path, self.geometry = path, Geometry(found)
+        self.motion: Companion | Columns
+        if scene is not None and "ports" in found:
+            self.motion = Companion(scene, found, plan)
+        else:
+            self.motion = Columns(path, self.geometry, found, names, plan)
         self.every = max(1, int(np.ceil(plan.rows / frames)))
+        frames = int(min(frames, plan.rows))
+        self.bar = tqdm(total=frames, unit="frame", delay=2, disable=None, leave=False, desc=path.name)
         self.folder = path.with_name(path.stem + "_frames")
         self.count, self.written = 0, []
         self.folder.mkdir(exist_ok=True)
@@ -121,13 +184,15 @@ class PvdFile:
         self.sets = ElementTree.SubElement(self.collection, "Collection")
 
     def write(self, block: np.ndarray) -> None:
-        for row in block[-self.count % self.every :: self.every]:
-            self.frame(row)
-        self.count += len(block)
+        for row in block:
+            self.motion.follow(row)
+            if self.count % self.every == 0:
+                self.frame(row)
+                self.bar.update()
+            self.count += 1
 
     def frame(self, row: np.ndarray) -> None:
-        values = np.concatenate([row, self.inputs.at(row[:1])[0], self.constants])
-        r, v, f = (values[self.places[quantity]] for quantity in "rvf")
+        r, v, f = self.motion.look(row)
         feet = self.geometry.projections(r[: len(self.geometry.ids)])
         still = np.zeros_like(feet)
         data = {"velocity": np.vstack([v, still]), "reaction": np.vstack([f, still])}
@@ -138,11 +203,13 @@ class PvdFile:
 
     def discard(self) -> None:
         """Of a run that stopped."""
+        self.bar.close()
         for file in self.written:
             file.unlink(missing_ok=True)
         if not any(self.folder.iterdir()):
             self.folder.rmdir()
 
     def close(self) -> None:
+        self.bar.close()
         ElementTree.indent(self.collection)
         ElementTree.ElementTree(self.collection).write(self.path, encoding="utf-8", xml_declaration=True)
