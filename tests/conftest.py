@@ -67,8 +67,3 @@ def command(tmp_path):
         )
 
     return run
-
-
-def pytest_collection_modifyitems(items):
-    """First what takes minutes in one test: the other processes have work meanwhile."""
-    items.sort(key=lambda item: item.path.stem != "test_sanitizers")

@@ -1,6 +1,7 @@
 """The FMU's functions in a program of their own (tests/calls), built with sanitizers: the first report ends it.
 
-The builds stay in build/sanitizers and build/threads. More sequences: `make sanitize`.
+The builds stay in build/sanitizers and build/threads; they take minutes, so `make sanitize` runs this and `make test` does
+not. CI does.
 """
 
 import csv
@@ -16,6 +17,7 @@ from fmu_calls import MODEL_EXCHANGE
 from fmu_scenes import ALL_FREE, DRIVEN, MIXED, SETTINGS, scene
 from port_scenes import ported
 
+pytestmark = pytest.mark.sanitizers
 ROOT = Path(__file__).resolve().parents[1]
 SEQUENCES = int(os.environ.get("TIEFMU_SEQUENCES", 2000))
 NEVER_ALLOWED = {"fmi2" + name for name in ["CancelStep", *MODEL_EXCHANGE]}
@@ -31,7 +33,7 @@ def program(preset: str) -> Path:
     }
     for command in (
         [bin / "cmake", "--preset", preset, f"-DPython_EXECUTABLE={sys.executable}"],
-        [bin / "cmake", "--build", "--preset", preset, "-j1"],
+        [bin / "cmake", "--build", "--preset", preset],
     ):
         done = subprocess.run(command, **settings)
         assert done.returncode == 0, done.stdout + done.stderr
