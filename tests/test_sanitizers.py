@@ -1,7 +1,7 @@
 """The FMU's functions in a program of their own (tests/calls), built with sanitizers: the first report ends it.
 
-The builds stay in build/sanitizers and build/threads; they take minutes, so `make sanitize` runs this and `make test` does
-not. CI does.
+The builds stay in build/sanitizers and build/threads. They take minutes: `make sanitize` runs this, and CI, but not
+`make test`.
 """
 
 import csv
