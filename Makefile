@@ -28,6 +28,9 @@ demo: $(VENV)/installed
 	$(BIN)/tiefmu demo --out out
 	$(BIN)/tiefmu accept examples/acceptance/weld.toml examples/acceptance/criteria.toml --pictures out/acceptance
 	$(BIN)/tiefmu report scenes/bracket.toml -o out/bracket.html
+	$(BIN)/tiefmu info scenes/bracket.toml --vtu out/bracket.vtu > out/bracket.txt
+	$(BIN)/tiefmu sweep examples/sweep/sweep.toml -o out/sweep.csv
+	$(BIN)/tiefmu advise scenes/heavy_slave.toml --host-step 1e-6 --host-stiffness 1e6
 
 # A second thread of NumPy's BLAS beside two workers only waits.
 test: $(VENV)/tested-with tools
@@ -86,7 +89,7 @@ $(VENV)/built-with: pyproject.toml
 	touch $@
 
 $(VENV)/installed: $(VENV)/built-with $(SOURCES)
-	$(BIN)/python -m pip install --quiet --no-build-isolation --editable '.[accept,report]'
+	$(BIN)/python -m pip install --quiet --no-build-isolation --editable '.[accept,report,sweep]'
 	touch $@
 
 # What tests and contributors need besides.

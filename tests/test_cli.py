@@ -311,16 +311,6 @@ def test_exit_statuses_of_the_process(weld, scene_file, command):
     assert nothing.returncode == 2 and "COMMAND" in nothing.stderr and "Traceback" not in nothing.stderr
 
 
-@pytest.mark.parametrize("name", ["build", "info", "run", "accept", "report", "sweep", "demo"])
-def test_help(capsys, name):
-    with pytest.raises(SystemExit) as stop:
-        main([name, "--help"])
-    assert stop.value.code == 0
-    said = capsys.readouterr().out
-    assert f"usage: tiefmu {name}" in said
-    assert f"example: tiefmu {name}" in " ".join(said.split())
-
-
 def test_version(capsys):
     with pytest.raises(SystemExit):
         main(["--version"])

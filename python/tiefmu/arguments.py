@@ -2,9 +2,26 @@
 
 import argparse
 import math
+import textwrap
 from pathlib import Path
 
 from .errors import UsageError
+
+
+class Help(argparse.HelpFormatter):
+    """Text that keeps options whole: --host-step is not broken at its hyphens."""
+
+    def _fill_text(self, text, width, indent):
+        return textwrap.fill(
+            " ".join(text.split()), width, initial_indent=indent, subsequent_indent=indent, break_on_hyphens=False
+        )
+
+
+class Parser(argparse.ArgumentParser):
+    """So are its commands."""
+
+    def __init__(self, **options):
+        super().__init__(**{"formatter_class": Help} | options)
 
 
 def positive(text: str) -> float:

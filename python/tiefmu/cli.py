@@ -8,7 +8,7 @@ from pathlib import Path
 
 from . import __version__, advise, study
 from .acceptance import command as accept_command
-from .arguments import check_folder_of, existing, is_fmu, positive, whole
+from .arguments import Parser, check_folder_of, existing, is_fmu, positive, whole
 from .binaries import libraries, stale
 from .decks import command as import_command
 from .demo import SCENES, demo
@@ -52,7 +52,7 @@ def fail(message: str) -> int:
 
 
 def parser() -> argparse.ArgumentParser:
-    top = argparse.ArgumentParser(
+    top = Parser(
         prog="tiefmu",
         description="Puts the tied interface of an explicit crash code into an FMI 2.0 co-simulation "
         "FMU. A scene is a TOML file; see scenes/ for examples.",

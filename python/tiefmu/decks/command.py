@@ -14,6 +14,7 @@ def add_parser(commands):
         description="Reads the ties of a Radioss, Abaqus, CalculiX or LS-DYNA deck, with the masses, inertias, "
         "stiffnesses and rotations that the solver would give their nodes, and writes a scene file, with mesh and node "
         "properties beside it. What was decided and why stands at the head of the scene file.",
+        epilog="example: tiefmu import crash.k --tie 'lower weld' -o weld.toml",
     )
     command.add_argument("deck", metavar="DECK", type=Path, help="deck, e.g. model_0000.rad, job.inp or crash.k")
     command.add_argument(

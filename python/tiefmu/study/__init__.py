@@ -9,6 +9,7 @@ def add_parser(commands):
         "study",
         help="speed, accuracy and stability, measured",
         description="Measures speed against accuracy, coupling and stability; writes CSV, charts and a page.",
+        epilog="example: tiefmu study coupling scenes/heavy_slave.toml",
     )
     studies = study.add_subparsers(required=True, metavar="STUDY")
     for module in (speed_accuracy, coupling, stability):

@@ -20,6 +20,7 @@ def add_parser(studies):
         help="the packaged FMU against a host, over the communication step",
         description="Couples the FMU of a scene with driven masters to a host that carries them, for each reaction "
         "mode and extrapolation, and compares with the monolithic system.",
+        epilog="example: tiefmu study coupling scenes/heavy_slave.toml --decades 3",
     )
     study.add_argument("scene", metavar="SCENE", nargs="+", help="scene file (TOML) with driven masters")
     study.add_argument(

@@ -24,6 +24,7 @@ def add_parser(studies):
         description="Runs the scene with every integrator, inertia, formulation and geometry that it allows, and with "
         "penalty ties, over a ladder of steps; writes DIR/speed-accuracy-NAME.csv, .svg and .png, and the page "
         "DIR/speed-accuracy.html of all scenes studied there. Ctrl-C leaves the rows finished so far.",
+        epilog="example: tiefmu study speed-accuracy scenes/rivet.toml --ladder 4 --out out/study",
     )
     parser.add_argument("scenes", metavar="SCENE", nargs="+", help="scene file (TOML)")
     parser.add_argument(

@@ -22,6 +22,7 @@ def add_parser(studies):
         help="measured against closed-form limits",
         description="Finds where methods, reactions and rules of thumb fail, and compares with "
         "their closed forms. Exit status 1 if one is off.",
+        epilog="example: tiefmu study stability --grid 16 --out out/study",
     )
     study.add_argument(
         "--out", metavar="DIR", type=Path, default=Path("out/study"), help="folder to write to (default: out/study)"
