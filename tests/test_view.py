@@ -178,3 +178,50 @@ def test_positions_cost_little(tmp_path, monkeypatch):
     a_node = (with_places - without) / 900
     assert 1 < a_node < 200_000 / most
     assert fmpy.read_model_description(tmp_path / "a.fmu").guid == fmpy.read_model_description(tmp_path / "b.fmu").guid
+
+
+@pytest.mark.parametrize(
+    "arguments, said",
+    [
+        (["info", "weld.toml", "--vtu", "weld.toml"], "weld.toml: is written as .vtu; give it that ending"),
+        (["run", "weld.toml", "--pvd", "weld.toml"], "weld.toml: is written as .pvd; give it that ending"),
+        (["report", "weld.toml", "-o", "weld.toml"], "weld.toml: is written as .html or .htm; give it that ending"),
+        (["info", "weld.toml", "--fields", "tie"], "--fields: needs --vtu, the file whose fields they are"),
+        (["run", "weld.toml", "--frames", "3"], "--frames: needs --pvd, the file whose frames they are"),
+    ],
+)
+def test_files_of_another_kind(arguments, said, weld, scene_file, capsys):
+    """A slip of the keyboard does not write over the scene."""
+    scene_file(weld)
+    before = Path("weld.toml").read_text()
+    assert main(arguments) == 2
+    assert capsys.readouterr().err.splitlines()[-1] == f"error: {said}"
+    assert Path("weld.toml").read_text() == before
+    assert [path.name for path in Path().iterdir()] == ["weld.toml"]
+
+
+def test_more_nodes_than_an_fmu_says_places_of(weld, scene_file, monkeypatch):
+    """Given the scene, its pictures have all of them."""
+    monkeypatch.setattr(importlib.import_module("tiefmu.report"), "MOST_PLACES", 3)
+    name = scene_file(weld)
+    assert main(["info", name, "--vtu", "ties.vtu"]) == 0
+    assert main(["run", name, "--stop-time", "0.01", "--pvd", "run.pvd", "--frames", "2"]) == 0
+    for file in ("ties.vtu", "run_frames/000000.vtu"):
+        np.testing.assert_allclose(
+            meshio.read(file).points[:4, :2], [[0, 0], [0.1, 0], [0.1, 0.1], [0, 0.1]], atol=1e-8
+        )
+
+
+def test_a_moving_mesh_of_a_deck(tmp_path, monkeypatch):
+    """A deck exposes its positions as a scene does."""
+    monkeypatch.chdir(tmp_path)
+    arguments = ["--input", str(SCENES / "pin_weld.csv"), "--stop-time", "0.001", "--frames", "4"]
+    assert main(["run", str(SCENES / "pin_weld.rad"), *arguments, "--pvd", "deck.pvd"]) == 0
+    assert main(["import", str(SCENES / "pin_weld.rad"), "-o", "weld.toml"]) == 0
+    assert main(["run", "weld.toml", *arguments, "--pvd", "scene.pvd"]) == 0
+    moved = []
+    for name in ("deck", "scene"):
+        frames = [meshio.read(f"{name}_frames/00000{k}.vtu") for k in range(4)]
+        moved.append(np.array([frame.points for frame in frames]))
+    np.testing.assert_array_equal(moved[0], moved[1])
+    assert np.ptp(moved[0], axis=0).max() > 0

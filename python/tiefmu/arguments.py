@@ -54,6 +54,12 @@ def existing(name: str) -> Path:
     return path
 
 
+def check_ending(path: Path, *endings: str) -> None:
+    """Raises UsageError where the file is called like one of another kind."""
+    if path.suffix.lower() not in endings:
+        raise UsageError(f"{path}: is written as {' or '.join(endings)}; give it that ending")
+
+
 def check_folder_of(path: Path) -> None:
     """Raises UsageError where the file could not be written because its folder is missing."""
     if not path.parent.is_dir():

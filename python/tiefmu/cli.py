@@ -8,7 +8,7 @@ from pathlib import Path
 
 from . import __version__, advise, study
 from .acceptance import command as accept_command
-from .arguments import Parser, check_folder_of, existing, is_fmu, positive, whole
+from .arguments import Parser, check_ending, check_folder_of, existing, is_fmu, positive, whole
 from .binaries import libraries, stale
 from .decks import command as import_command
 from .demo import SCENES, demo
@@ -129,9 +129,7 @@ def parser() -> argparse.ArgumentParser:
         help="file for ParaView: the moving mesh over time, with velocities and reactions; its VTU files lie in the "
         "folder PVD_frames",
     )
-    run.add_argument(
-        "--frames", metavar="N", type=whole, default=FRAMES, help=f"most frames of --pvd (default: {FRAMES})"
-    )
+    run.add_argument("--frames", metavar="N", type=whole, help=f"most frames of --pvd (default: {FRAMES})")
     run.set_defaults(command=run_run)
 
     demo = commands.add_parser(
@@ -176,7 +174,10 @@ def run_build(options: argparse.Namespace) -> None:
 
 def run_info(options: argparse.Namespace) -> None:
     if options.vtu:
+        check_ending(options.vtu, ".vtu")
         check_folder_of(options.vtu)
+    elif options.fields:
+        raise UsageError("--fields: needs --vtu, the file whose fields they are")
     found = (
         of_fmu(existing(options.model))
         if is_fmu(options.model)
@@ -201,7 +202,11 @@ def run_run(options: argparse.Namespace) -> None:
         check_format(options.output)
     if options.plot:
         check_picture(options.plot)
-    pvd = (options.pvd, options.frames) if options.pvd else None
+    if options.pvd:
+        check_ending(options.pvd, ".pvd")
+    elif options.frames is not None:
+        raise UsageError("--frames: needs --pvd, the file whose frames they are")
+    pvd = (options.pvd, options.frames or FRAMES) if options.pvd else None
     with fmu_of(options.model, positions=pvd is not None) as (fmu, scene):
         result, found = run(
             fmu, options.stop_time, options.step, options.input, options.model, options.output, pvd, scene

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from .. import __version__, sections
-from ..arguments import check_folder_of, existing, is_fmu
+from ..arguments import check_ending, check_folder_of, existing, is_fmu
 from ..errors import UsageError
 from ..html_page import bullets, document, paragraph, table
 from ..loading import load
@@ -38,6 +38,7 @@ def add_parser(commands) -> None:
 
 def run_report(options: argparse.Namespace) -> None:
     path = options.output or Path(f"{Path(options.model).stem}.html")
+    check_ending(path, ".html", ".htm")
     check_folder_of(path)
     needed("plotly", "report", "tiefmu report")
     found = of_fmu(existing(options.model)) if is_fmu(options.model) else report(load(options.model), positions=True)
