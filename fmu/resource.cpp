@@ -12,7 +12,7 @@ namespace tiefmu {
 namespace {
 
 constexpr std::string_view magic = "tiefmu scene\n";
-constexpr std::uint32_t formatVersion = 4;  // raise it whenever a `field` changes
+constexpr std::uint32_t formatVersion = 5;  // raise it whenever a `field` changes
 constexpr std::size_t headerSize = magic.size() + 4 + 8 + 8;
 
 // FNV-1a, 64 bit: against damage in transport, not against intent.
@@ -117,8 +117,10 @@ template <class Archive> void field(Archive& a, SpringEnd& end) {
 }
 
 template <class Archive> void field(Archive& a, Spring& spring) {
-  auto& [end, other, kind, stiffness, damping, rotationalStiffness, rotationalDamping, arm, anchor, length] = spring;
-  fields(a, end, other, kind, stiffness, damping, rotationalStiffness, rotationalDamping, arm, anchor, length);
+  auto& [end, other, kind, stiffness, damping, rotationalStiffness, rotationalDamping, arm, anchor, length, along,
+         across] = spring;
+  fields(a, end, other, kind, stiffness, damping, rotationalStiffness, rotationalDamping, arm, anchor, length, along,
+         across);
 }
 
 template <class Archive> void field(Archive& a, TieGroup& group) {
@@ -265,7 +267,8 @@ void checkSprings(const Model& m) {
     checkEnd(s.a);
     checkEnd(s.b);
     requireEnum(s.kind, "kind of spring");
-    for (const Vec3* v : {&s.stiffness, &s.damping, &s.rotationalStiffness, &s.rotationalDamping, &s.arm, &s.anchor})
+    for (const Vec3* v : {&s.stiffness, &s.damping, &s.rotationalStiffness, &s.rotationalDamping, &s.arm, &s.anchor,
+                          &s.along, &s.across})
       require(v->allFinite(), "springs");
     require(std::isfinite(s.length), "springs");
   }

@@ -225,7 +225,7 @@ void Influences::addSpring(const Spring& spring, const std::vector<Motion>& ends
   const Pattern cross = moving(crossPattern), full = moving(fullPattern);
   const Pattern stiff = diagonalPattern(spring.stiffness), damped = diagonalPattern(spring.damping);
   const Pattern twisted = diagonalPattern(spring.rotationalDamping);
-  const bool axial = spring.kind == SpringKind::axial;
+  const bool axial = spring.kind == SpringKind::axial, beam = spring.kind == SpringKind::beam;
   const bool bTurns =
       spring.b.slave >= 0 ? spring.b.slave < model.turning() : spring.b.node >= 0 && spring.b.node < model.rotating();
   for (const SpringEnd* end : {&spring.a, &spring.b}) {
@@ -242,6 +242,14 @@ void Influences::addSpring(const Spring& spring, const std::vector<Motion>& ends
     if (axial) {
       if (spring.stiffness[0] != 0 || spring.damping[0] != 0) add(force, full, ex);
       if (spring.damping[0] != 0) add(force, full, ev);
+    } else if (beam) {  // its axes turn, and with them everything
+      if (!stiff.empty() || !damped.empty()) add(force, full, ex);
+      if (!damped.empty()) add(force, full, ev);
+      if (!damped.empty()) add(force, full, ew);
+      for (List* moment : {&a.moment, &b.moment}) {
+        add(*moment, full, force);
+        if (!twisted.empty()) add(*moment, full, ew);
+      }
     } else {  // K (line - R_b arm) + C (rate of line - w_b x line)
       add(force, stiff, ex);
       if (bTurns) add(force, damped * cross, ex);

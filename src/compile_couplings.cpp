@@ -126,7 +126,7 @@ void Compilation::resolveRotations() {
     if (kinematicsOf(b.coupling).mastersTurn)
       for (int i = 0; i < b.corners; ++i) used[scene.segments.nodes[b.segment][i]] = 1;
   for (const SceneSpring& s : scene.springs)
-    if (s.kind == SpringKind::bushing) {
+    if (s.kind != SpringKind::axial) {
       used[s.a] = 1;
       if (s.b >= 0) used[s.b] = 1;
     }

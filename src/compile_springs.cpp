@@ -22,6 +22,22 @@ void Compilation::orient(SpringEnd& end) {
   end.orientation = index;
 }
 
+// The first axis runs from b to a, as the arm does; the second one lies on the side of the orientation. False where
+// that is parallel to the first.
+static bool axesOfBeam(const SceneSpring& spec, Spring& spring) {
+  constexpr double parallel = 1e-6;  // sine of the least angle
+  spring.along = spring.arm / spring.length;
+  Vec3 side = spec.orientation;
+  const bool given = !side.isZero(0);
+  if (!given) side = Vec3::UnitY();
+  side.normalize();
+  if (!given && side.cross(spring.along).norm() < parallel) side = Vec3::UnitZ();
+  side -= side.dot(spring.along) * spring.along;
+  if (!(side.norm() >= parallel)) return false;
+  spring.across = side.normalized();
+  return true;
+}
+
 void Compilation::placeSprings() {
   orientationOfSlave.assign(bonds.size(), -1);
   orientationOfNode.assign(model.nodeId.size(), -1);
@@ -54,6 +70,21 @@ void Compilation::placeSprings() {
       if (!(spring.length > 0))
         throw SceneError(where + "nodes " + id(spec.a) + " and " + id(spec.b) +
                          " are at the same place; an axial spring needs two distinct positions");
+    } else if (spec.kind == SpringKind::beam) {
+      if (ground)
+        throw SceneError(where + "node " + id(spec.a) +
+                         ": a beam to its own start position has no "
+                         "direction; use kind = \"bushing\"");
+      if (!(spring.length > 0))
+        throw SceneError(where + "nodes " + id(spec.a) + " and " + id(spec.b) +
+                         " are at the same place; a beam needs two distinct positions");
+      for (const auto& [node, end] : {std::pair{spec.a, &spring.a}, std::pair{spec.b, &spring.b}}) {
+        if (!canTurn(*end)) throw SceneError(where + cannotTurn(node, *end));
+        orient(*end);
+      }
+      if (!axesOfBeam(spec, spring))
+        throw SceneError(where + "its orientation is parallel to the line between nodes " + id(spec.a) + " and " +
+                         id(spec.b));
     } else {
       const bool torsion = !spec.rotationalStiffness.isZero(0) || !spec.rotationalDamping.isZero(0);
       for (const auto& [node, end] : {std::pair{spec.a, &spring.a}, std::pair{spec.b, &spring.b}})

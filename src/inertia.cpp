@@ -85,14 +85,18 @@ void nodalStiffness(const Model& model, double* translation, double* rotation) {
   for (const Spring& spring : model.springs) {
     const double stiffness = spring.stiffness.maxCoeff(), turning = spring.rotationalStiffness.maxCoeff();
     for (const SpringEnd* end : {&spring.a, &spring.b}) {
-      // The second end of a bushing also carries the moment of the shear force.
-      const double arm2 = spring.kind == SpringKind::bushing && end == &spring.b ? spring.arm.squaredNorm() : 0;
+      // The second end of a bushing also carries the moment of the shear force, and both ends of a beam.
+      double shear = 0;
+      if (spring.kind == SpringKind::bushing && end == &spring.b)
+        shear = stiffness * spring.arm.squaredNorm();
+      else if (spring.kind == SpringKind::beam)
+        shear = spring.stiffness.tail<2>().maxCoeff() * spring.arm.squaredNorm();
       if (end->slave >= 0) {
         k[end->slave] += stiffness;
-        kr[end->slave] += turning + stiffness * arm2;
+        kr[end->slave] += turning + shear;
       } else if (end->node >= 0) {
         translation[end->node] += stiffness;
-        if (end->node < model.rotating()) rotation[end->node] += turning + stiffness * arm2;
+        if (end->node < model.rotating()) rotation[end->node] += turning + shear;
       }
     }
   }

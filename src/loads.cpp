@@ -39,13 +39,15 @@ void Loads::gather(const double* v, const double* w) {
     nodeForce_ = f_.data();
     nodeMoment_ = t_.data();
   }
-  if (fs_.empty()) return;
-  std::copy_n(slaveForce_, fs_.size(), fs_.begin());
-  std::copy_n(slaveMoment_, ms_.size(), ms_.begin());
-  slaveForce_ = fs_.data();
-  slaveMoment_ = ms_.data();
-  if (gravity_)
-    for (int s = 0; s < model_.slaves(); ++s) at(fs_.data(), s) += field(Field::slaveMass)[s] * model_.settings.gravity;
+  if (!fs_.empty()) {  // a scene of springs alone has no slaves
+    std::copy_n(slaveForce_, fs_.size(), fs_.begin());
+    std::copy_n(slaveMoment_, ms_.size(), ms_.begin());
+    slaveForce_ = fs_.data();
+    slaveMoment_ = ms_.data();
+    if (gravity_)
+      for (int s = 0; s < model_.slaves(); ++s)
+        at(fs_.data(), s) += field(Field::slaveMass)[s] * model_.settings.gravity;
+  }
   if (springs_.empty() && !ports_.anyOfSlaves()) return;
   if (layout_[Field::position].count > 0) slaves_.updatePositions();
   if (ports_.anyOfSlaves()) {

@@ -75,11 +75,12 @@ struct SpringEnd {
 struct Spring {
   SpringEnd a, b;
   SpringKind kind;
-  Vec3 stiffness, damping;                      // N/m, N s/m; axial: the first entry of each
+  Vec3 stiffness, damping;                      // N/m, N s/m; axial: the first entry of each; beam: along its axes
   Vec3 rotationalStiffness, rotationalDamping;  // N m/rad, N m s/rad
   Vec3 arm;                                     // position of a minus position of b at the start, m (zero for ground)
   Vec3 anchor;                                  // ground: where it is, m
-  double length;                                // rest length of an axial spring, m
+  double length;                                // at the start, of an axial spring the rest length, m
+  Vec3 along = Vec3::Zero(), across = Vec3::Zero();  // of a beam: its first and second axis at the start
 };
 
 // Nodes that the interface shows as one rigid body about a reference point.

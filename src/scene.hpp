@@ -16,7 +16,7 @@ namespace tiefmu {
 enum class Motion : std::uint8_t { driven, free, fixed };
 enum class Formulation : std::uint8_t { standard, optimized };  // Spotflag 0 and 1; "default" is a C++ keyword
 enum class SearchMethod : std::uint8_t { box, nearestNode };    // Isearch 2 and 1
-enum class SpringKind : std::uint8_t { axial, bushing };
+enum class SpringKind : std::uint8_t { axial, bushing, beam };
 enum class Inertia : std::uint8_t { lumped, consistent };
 enum class Reaction : std::uint8_t { loads, full, split };
 enum class Geometry : std::uint8_t { finite, small };
@@ -29,7 +29,7 @@ template <class E> inline constexpr std::array<const char*, 0> words{};
 template <> inline constexpr auto words<Motion> = std::array{"driven", "free", "fixed"};
 template <> inline constexpr auto words<Formulation> = std::array{"default", "optimized"};
 template <> inline constexpr auto words<SearchMethod> = std::array{"box", "nearest-node"};
-template <> inline constexpr auto words<SpringKind> = std::array{"axial", "bushing"};
+template <> inline constexpr auto words<SpringKind> = std::array{"axial", "bushing", "beam"};
 template <> inline constexpr auto words<Inertia> = std::array{"lumped", "consistent"};
 template <> inline constexpr auto words<Reaction> = std::array{"loads", "full", "split"};
 template <> inline constexpr auto words<Geometry> = std::array{"finite", "small"};
@@ -71,10 +71,11 @@ struct SceneSpring {
   int a = -1;        // node index
   int b = -1;        // node index, or -1: ground at the start position of a
   SpringKind kind{};
-  Vec3 stiffness = Vec3::Zero();            // N/m; axial: the first entry
+  Vec3 stiffness = Vec3::Zero();            // N/m; axial: the first entry; beam: along its own axes
   Vec3 damping = Vec3::Zero();              // N s/m
   Vec3 rotationalStiffness = Vec3::Zero();  // N m/rad
   Vec3 rotationalDamping = Vec3::Zero();    // N m s/rad
+  Vec3 orientation = Vec3::Zero();          // of a beam: the side of its second axis; zero: global y, or z along y
 };
 
 constexpr int mostThreads = 256;

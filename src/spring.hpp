@@ -21,6 +21,8 @@ struct SpringLoad {
 // Bushing, theory (3.6) to (3.8): translation u = x_a - x_b - R_b arm, rotation vector theta of R_b R_a^T, both in
 // inertial axes; the moment of the force on a about b is balanced on b. With isotropic stiffness the forces derive from
 // (k u.u + kr theta.theta) / 2.
+// Beam, theory (3.15) to (3.18): both measured from the rotation half-way between the ends', along axes that turn with
+// it, so that any stiffness has a potential and a beam of straight, equal sections is exact to first order.
 SpringLoad springLoad(const Spring& spring, const EndMotion& a, const EndMotion& b);
 
 // The linear part about the present state, of the material and of an axial spring's tension across its line: from a

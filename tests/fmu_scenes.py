@@ -66,6 +66,7 @@ def scene(rng, formulation, rotations, motion, inertia, reaction, geometry, posi
     table.append({"nodes": [202], "motion": "free", "rotations": turns, "mass": 1.5, "inertia": 0.3 if turns else 0.0})
     table += [{"nodes": [101 + j], "mass": rng.uniform(1, 2), "inertia": 0.3 if turns else 0.0} for j in range(5)]
     turning = {"rotational_stiffness": 2.0, "rotational_damping": [0.1, 0.2, 0.3]} if turns else {}
+    beam = {"nodes": [105, 202], "kind": "beam", "stiffness": [4.0, 2.0, 3.0], "damping": [0.3, 0.2, 0.1]} | turning
     return {
         "mesh": {"nodes": nodes, "segments": [[1, 1, 2, 3, 4], [2, 2, 5, 3], [3, 6, 7, 8, 9], [4, 7, 10, 8]]},
         "node": table,
@@ -88,6 +89,7 @@ def scene(rng, formulation, rotations, motion, inertia, reaction, geometry, posi
             },
             {"nodes": [104, 202], "kind": "axial", "stiffness": 2.0, "damping": 0.3},
             {"nodes": [201, 5], "kind": "axial", "stiffness": 2.0, "damping": 0.3},
+            *([beam | {"orientation": [0.2, 1.0, 0.1]}] if turns else []),
         ],
         "initial": [
             {"nodes": [i for i, m in zip(masters, motions) if m == "free"] + [202], "v": rng.normal(size=3).tolist()}

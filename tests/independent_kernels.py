@@ -268,9 +268,45 @@ class Spring:
         self.kr, self.cr = three("rotational_stiffness"), three("rotational_damping")
         self.arm = xa - xb
         self.anchor = xb
+        self.beam = None
+        if table["kind"] == "beam":  # its axes at the start as columns
+            along = self.arm / np.linalg.norm(self.arm)
+            across = np.array(table.get("orientation", [0, 1, 0]), float)
+            across = across - (across @ along) * along
+            across /= np.linalg.norm(across)
+            self.beam = np.column_stack([along, across, np.cross(along, across)])
+
+    def strains(self, x1, x2, q1, q2):
+        """Of a beam (6,): translations and rotations of its ends along its axes, theory (3.16), (3.17)."""
+        theta = rotation_vector(relative(q2, q1))
+        e = rotation_matrix(quaternion_product(exponential(theta / 2), q1)) @ self.beam
+        u = e.T @ (x1 - x2)
+        u[0] -= np.linalg.norm(self.arm)
+        return np.concatenate([u, e.T @ theta])
+
+    def beam_map(self, x1, x2, q1, q2):
+        """(6, 12): how its strains change with small motions of a and b, by differences of fourth order."""
+        h = 2e-4
+
+        def moved(motion):
+            u1, t1, u2, t2 = motion.reshape(4, 3)
+            turned = [quaternion_product(exponential(t), q) for t, q in ((t1, q1), (t2, q2))]
+            return self.strains(x1 + u1, x2 + u2, *turned)
+
+        columns = [
+            (8 * (moved(h * one) - moved(-h * one)) - (moved(2 * h * one) - moved(-2 * h * one))) / (12 * h)
+            for one in np.eye(12)
+        ]
+        return np.column_stack(columns)
 
     def load(self, x1, x2, v1, v2, q1, q2, w1, w2):
         """Load (6,) on a, load on b, strain energy, dissipated power."""
+        if self.beam is not None:  # what derives from the energy of its strains
+            k, c = np.concatenate([self.k, self.kr]), np.concatenate([self.c, self.cr])
+            strain, b = self.strains(x1, x2, q1, q2), self.beam_map(x1, x2, q1, q2)
+            rate = b @ np.concatenate([v1, w1, v2, w2])
+            load = -b.T @ (k * strain + c * rate)
+            return load[:6], load[6:], 0.5 * k @ strain**2, c @ rate**2
         gap = x1 - x2
         if self.axial:
             length = np.linalg.norm(gap)
@@ -298,6 +334,9 @@ class Spring:
 
     def strain_map(self):
         """(6, 12): small motions (u, theta) of a and b to strains, and their stiffnesses (6,)."""
+        if self.beam is not None:
+            one = np.array([1.0, 0, 0, 0])
+            return self.beam_map(self.arm, 0 * self.arm, one, one), np.concatenate([self.k, self.kr])
         b = np.zeros((6, 12))
         if self.axial:
             u = self.arm / np.linalg.norm(self.arm)

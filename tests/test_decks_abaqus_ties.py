@@ -145,7 +145,7 @@ def test_tied_nset(tmp_path):
 @pytest.mark.parametrize("kind", ["SURFACE TO SURFACE", "NODE TO SURFACE", "surface to surface"])
 def test_types(tmp_path, kind):
     found = raw(deck().tie("pins", "quads", f", TYPE={kind}"), tmp_path)
-    assert any("SURFACE TO SURFACE is taken" in line for line in found.notes) == (kind[0] in "Ss")
+    assert any("SURFACE TO SURFACE is taken" in line for line in found.warnings) == (kind[0] in "Ss")
 
 
 @pytest.mark.parametrize(

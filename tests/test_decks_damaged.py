@@ -90,9 +90,7 @@ def test_numbers_that_are_none(tmp_path):
         text = changed(node, f"{4:>10}{word:>20}{1.0:>20.12g}")
         assert message(text, tmp_path) == f"line {start}: /NODE: columns 11 to 30: expected a number, found '{word}'"
     found = message(changed(node, f"{4:>10}{'&length':>20}{1.0:>20.12g}"), tmp_path)
-    assert found == f"line {start}: /NODE: columns 11 to 30: expected a number, found '&length'" + (
-        "; /PARAMETER is not supported"
-    )
+    assert found == f"line {start}: /NODE: parameter &length is not in the deck"
     huge = changed(f"{4:>10}{0.0:>20.12g}", f"{'9' * 10}{0.0:>20.12g}")
     assert "node 4 is not in the deck" in message(huge, tmp_path)
 

@@ -194,7 +194,7 @@ TUBE = np.pi / 4 * (0.1**2 - 0.06**2), np.pi / 64 * (0.1**4 - 0.06**4)
 def test_beams(tmp_path, first, second, area, bending, torsion, option):
     made = DynaDeck().elastic(1, RHO, E, NU, "SPOTWELD").part()
     made.block("SECTION_BEAM", ("iirrr", 1, *first), second)
-    more = [("RRR", 0.0, 0.0, 1.0)] if option else []
+    more = [("rrr", 0.0, 0.0, 1.0)] if option else []
     found, _ = read(made.block(f"ELEMENT_BEAM{option}", ("I" * 5, 1, 1, 1, 2, 3), *more), tmp_path, LINE)
     close(found[1], **beam_values(area, bending, torsion))
     assert found[1]["rotates"] and found[3]["m"] == 0

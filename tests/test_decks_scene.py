@@ -138,23 +138,27 @@ def test_general_spring_is_a_bushing(tmp_path):
 
 def test_beam_spring_stands_along_z(tmp_path):
     (table,) = with_spring(tmp_path, kind=13, k=(1.0, 2.0, 3.0, 4.0, 5.0, 6.0)).scene.tables["spring"]
-    # x of the spring is z of the scene, its y is y, its z is -x
-    assert table["stiffness"] == [3, 2, 1] and table["rotational_stiffness"] == [6, 5, 4]
-
-
-def test_slanted_beam_spring_is_a_bushing_and_an_axial_spring(tmp_path):
-    (bushing,) = with_spring(tmp_path, b=13, kind=13, k=(5.0, 2.0, 2.0, 3.0, 3.0, 3.0)).scene.tables["spring"]
-    assert bushing["stiffness"] == [5, 2, 2]  # along x
-    made = deck().nodes({14: (0.9, 0.8, 0.1)}).spring(2, 13, k=(5.0, 2.0, 2.0, 3.0, 3.0, 3.0)).part(2, 2, 0)
-    bushing, axial = read(made.elements("SPRING", 2, {5: (11, 14)}), tmp_path).scene.tables["spring"]
-    assert bushing["stiffness"] == [2, 2, 2] and axial == {
-        **{"nodes": [11, 14], "kind": "axial", "stiffness": 3.0, "damping": 0.0}
+    assert table == {
+        **{"nodes": [11, 12], "kind": "beam", "stiffness": [1, 2, 3], "rotational_stiffness": [4, 5, 6]},
+        "orientation": [0, 1, 0],
     }
 
 
+def test_slanted_beam_spring(tmp_path):
+    """Its y axis is on the side of that of its skew; the same stiffness across needs no axis."""
+    made = deck().nodes({14: (0.9, 0.8, 0.1)}).spring(2, 13, k=(5.0, 2.0, 2.0, 3.0, 3.0, 3.0)).part(2, 2, 0)
+    (table,) = read(made.elements("SPRING", 2, {5: (11, 14)}), tmp_path).scene.tables["spring"]
+    assert table["stiffness"] == [5, 2, 2] and table["kind"] == "beam" and "orientation" not in table
+    made = deck().nodes({14: (0.9, 0.8, 0.1)}).spring(2, 13, k=(1.0, 2.0, 6.0, 3.0, 3.0, 3.0), skew=4).part(2, 2, 0)
+    made.block("/SKEW/FIX/4", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), (1.0, 0.0, 0.0), title="y' = z, z' = x")
+    (table,) = read(made.elements("SPRING", 2, {5: (11, 14)}), tmp_path).scene.tables["spring"]
+    assert table["stiffness"] == [1, 2, 6] and table["orientation"] == pytest.approx([0, 0, 1])
+
+
 def test_axes_that_a_scene_cannot_have_are_averaged_with_a_warning(tmp_path):
-    made = deck().nodes({14: (0.9, 0.8, 0.1)}).spring(2, 13, k=(1.0, 2.0, 6.0, 3.0, 3.0, 3.0)).part(2, 2, 0)
-    found = read(made.elements("SPRING", 2, {5: (11, 14)}), tmp_path)
+    made = deck().spring(2, 8, k=(1.0, 2.0, 6.0, 3.0, 3.0, 3.0), skew=4).part(2, 2, 0)
+    made.block("/SKEW/FIX/4", (0.0, 0.0, 0.0), (0.0, 1.0, 1.0), (0.0, -1.0, 1.0), title="slanted")
+    found = read(made.elements("SPRING", 2, {5: (11, 12)}), tmp_path)
     assert found.scene.tables["spring"][0]["stiffness"] == [3, 3, 3]
     assert any("the mean of its three stiffnesses" in line for line in found.deck.warnings)
 
@@ -189,10 +193,31 @@ def test_added_masses(tmp_path):
     own = 7800 * 2 * 1e-3 / 4
     expected = {1: own + 3 + 1.5 + 5, 2: own + 3 + 1.5 + 5, 3: own + 5 + 7, 4: own + 5 + 9, 11: 0.5}
     assert column(read(made, tmp_path), "mass") == pytest.approx(expected)
-    made.block("/ADMAS/3/6", (1.0, 1), title="on parts")
-    assert any(
-        "/ADMAS/3/6: type 3 spreads mass over parts; it is not added" in w for w in read(made, tmp_path).deck.warnings
-    )
+
+
+@pytest.mark.parametrize("kind, mass", [(3, 6.0), (4, 6.0 + 23.4), (6, 6.0), (7, 6.0 + 23.4)])
+def test_masses_spread_over_parts(tmp_path, kind, mass):
+    """6 kg on two shells of 15.6 kg and 7.8 kg: by their own masses within a part, and among the parts of a group. A
+    final mass counts what is there."""
+    made = deck().nodes({14: (3, 0, 0), 15: (3, 1, 0)}).part(2).elements("SHELL", 2, {2: (2, 14, 15, 3)})
+    if kind < 5:
+        made.block("/GRPART/PART/7", (1, 2), title="both").block(f"/ADMAS/{kind}/6", (mass, 7, 0), title="on both")
+        on_first, on_second = 4.0, 2.0
+    else:
+        shift = 0.0 if kind == 6 else 15.6, 0.0 if kind == 6 else 7.8
+        made.block(f"/ADMAS/{kind}/6", (4.0 + shift[0], 1, 0), (2.0 + shift[1], 2, 0), title="on each")
+        on_first, on_second = 4.0, 2.0
+    found = column(read(made, tmp_path), "mass")
+    assert found[1] == pytest.approx((15.6 + on_first) / 4)
+    assert found[2] == pytest.approx((15.6 + on_first + 7.8 + on_second) / 4)
+
+
+def test_final_mass_below_that_of_the_part(tmp_path):
+    made = deck().block("/ADMAS/7/6", (1.0, 1, 0), title="too little")
+    with pytest.raises(
+        tiefmu.SceneError, match=r"/ADMAS/7/6: its final mass 1 is not more than that of its parts, 15\.6"
+    ):
+        read(made, tmp_path)
 
 
 def test_start_velocities(tmp_path):
@@ -229,14 +254,14 @@ def test_slaves_that_turn_over_solids_lose_their_rotations_in_a_default_tie(tmp_
 
 
 def test_keywords_that_are_not_understood_are_named_with_their_line(tmp_path):
-    made = deck().block("/NEWTHING/7", (1,), title="what is it").block("/RBE2/1", (1,), title="rigid")
+    made = deck().block("/NEWTHING/7", (1,), title="what is it").block("/RBE3/1", (1,), title="rigid")
     made.block("/TH/NODE/1", (1,), title="history").block("/INTER/TYPE7/4", (1, 1), title="contact")
     made.block("/INTER/LAGMUL/TYPE2/5", (1, 1), title="multipliers")
     found = read(made, tmp_path).deck
     text = "\n".join(found.warnings)
     line = made.lines.index("/NEWTHING/7") + 1
     assert f"line {line}: /NEWTHING/7: is not understood and is left aside" in text
-    assert "/RBE2/1: is not read; its nodes are treated as if it were not there" in text
+    assert "/RBE3/1: is not read; its nodes are treated as if it were not there" in text
     assert "ties by Lagrange multipliers are not imported" in text
     assert found.ignored["/TH"][1] == 1 and found.ignored["/INTER/TYPE7"][0] == "contacts are the host's"
 

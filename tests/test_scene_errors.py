@@ -104,8 +104,8 @@ CASES = {
     ),
     "kind": (
         ("spring",),
-        [{"nodes": [1, 2], "kind": "beam"}],
-        "spring 1: kind: 'beam' is not one of 'axial', 'bushing'",
+        [{"nodes": [1, 2], "kind": "rod"}],
+        "spring 1: kind: 'rod' is not one of 'axial', 'bushing', 'beam'",
     ),
     "unit": (
         ("units", "length"),
@@ -210,6 +210,26 @@ CASES = {
         ("spring",),
         [{"ground": [1]}],
         'spring 1: node 1: an axial spring to its own start position has no direction; use kind = "bushing"',
+    ),
+    "beam to ground": (
+        ("spring",),
+        [{"ground": [1], "kind": "beam"}],
+        'spring 1: node 1: a beam to its own start position has no direction; use kind = "bushing"',
+    ),
+    "beam along its orientation": (
+        ("spring",),
+        [{"nodes": [1, 2], "kind": "beam", "orientation": [2, 0, 0]}],
+        "spring 1: its orientation is parallel to the line between nodes 1 and 2",
+    ),
+    "orientation without length": (
+        ("spring",),
+        [{"nodes": [1, 2], "kind": "beam", "orientation": [0, 0, 0]}],
+        "spring 1: orientation: [0, 0, 0] is no direction",
+    ),
+    "orientation of a bushing": (
+        ("spring",),
+        [{"nodes": [1, 2], "kind": "bushing", "orientation": [0, 0, 1]}],
+        "spring 1: orientation: only a beam has one; found kind 'bushing'",
     ),
     "bushing with two entries": (
         ("spring",),

@@ -42,6 +42,7 @@ SCENE = {
             "rotational_damping": 6.0,
         },
         {"ground": [2, 3, 201], "kind": "axial", "stiffness": 2.0} | {"kind": "bushing"},
+        {"nodes": [2, 201], "kind": "beam", "stiffness": 2.0, "orientation": [0.0, 0.0, 1.0]},
     ],
     "initial": [{"nodes": [2, 3], "v": [0.1, 0.2, 0.3], "w": [0.0, 0.01, 0.0]}],
     "model": {

@@ -87,7 +87,8 @@ void addTie(Scene& scene, const std::string& name, const Indices& segments, cons
 
 void addSprings(Scene& scene, const std::string& name, const Indices& a, const Indices& b, SpringKind kind,
                 const std::array<double, 3>& stiffness, const std::array<double, 3>& damping,
-                const std::array<double, 3>& rotationalStiffness, const std::array<double, 3>& rotationalDamping) {
+                const std::array<double, 3>& rotationalStiffness, const std::array<double, 3>& rotationalDamping,
+                const std::array<double, 3>& orientation) {
   require(a.shape(0) == b.shape(0), "add_springs: arrays of different length");
   const std::vector<int> first = indices(a, scene.nodes.id.size(), 0, "add_springs: a");
   const std::vector<int> second = indices(b, scene.nodes.id.size(), -1, "add_springs: b");
@@ -98,6 +99,7 @@ void addSprings(Scene& scene, const std::string& name, const Indices& a, const I
   spring.damping = at(damping.data(), 0);
   spring.rotationalStiffness = at(rotationalStiffness.data(), 0);
   spring.rotationalDamping = at(rotationalDamping.data(), 0);
+  spring.orientation = at(orientation.data(), 0);
   for (std::size_t i = 0; i < first.size(); ++i) {
     spring.a = first[i];
     spring.b = second[i];
@@ -161,7 +163,7 @@ void bindScene(nb::module_& m) {
            "drop_unresolved"_a,
            "segments, slaves: int32 indices; search_distance: m, 0: root mean square of the master edges.")
       .def("add_springs", &addSprings, "name"_a, "a"_a, "b"_a, "kind"_a, "stiffness"_a, "damping"_a,
-           "rotational_stiffness"_a, "rotational_damping"_a,
+           "rotational_stiffness"_a, "rotational_damping"_a, "orientation"_a,
            "One spring for each pair of a and b (int32 node indices; b = -1: ground), all of the same kind.")
       .def("add_port", &addPort, "name"_a, "nodes"_a, "listed"_a, "at"_a,
            "nodes: int32 indices; listed: by ids, so that each must be part of the model; at: [x, y, z], or empty for "

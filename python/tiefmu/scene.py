@@ -283,6 +283,7 @@ class Assembly:
                     np.broadcast_to(si(key, getattr(spring, key)), 3).copy()
                     for key in ("stiffness", "damping", "rotational_stiffness", "rotational_damping")
                 ),
+                spring.orientation or [0.0, 0.0, 0.0],
             )
         for port, nodes in zip(self.tables.interface.ports, self.ports):
             place = np.empty(0) if port["at"] is None else si("position", port["at"])

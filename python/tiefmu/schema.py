@@ -220,11 +220,12 @@ class Tie(Table):
 class Spring(Table):
     nodes: TwoNodes | None = None
     ground: Selection | None = None
-    kind: Literal["axial", "bushing"] = "axial"
+    kind: Literal["axial", "bushing", "beam"] = "axial"
     stiffness: NotNegativeVector = 0.0
     damping: NotNegativeVector = 0.0
     rotational_stiffness: NotNegativeVector = 0.0
     rotational_damping: NotNegativeVector = 0.0
+    orientation: Vector | None = None
 
     @model_validator(mode="after")
     def ends(self):
@@ -232,7 +233,13 @@ class Spring(Table):
             raise wrong(
                 "give either nodes = [a, b] or ground = [ids], " + ("not both" if self.nodes else "found neither")
             )
-        if self.kind == "bushing":
+        if self.orientation is not None and (self.kind != "beam" or not any(self.orientation)):
+            raise wrong(
+                f"orientation: only a beam has one; found kind '{self.kind}'"
+                if self.kind != "beam"
+                else "orientation: [0, 0, 0] is no direction"
+            )
+        if self.kind != "axial":
             return self
         for key in ("rotational_stiffness", "rotational_damping"):
             if key in self.model_fields_set:

@@ -8,12 +8,13 @@ material; QBAT and QEPH take at least dn. Stiffness is a nodal one: the nodal st
 Values of a Property:
 shell: thickness, formulation (q4, qbat, qeph), triangle (c0, dkt18), dm, dn, offset (of the mid-surface, in t)
 solid: qb (linear bulk viscosity), rotary (true: nodes rotate), tetra10 (0, 2: time step of a tetra4)
-truss, beam: area; beam: iyy, izz, ixx, dm, df
+truss, beam: area; beam: iyy, izz, ixx, dm, df, and what beams.py names
 spring: mass, inertia, per_length, and vectors of three: stiffness, damping, rotational_stiffness,
 rotational_damping; type: axial (only the first counts), general, beam (shear turns its ends); turning: false where a
 general one has no rotations
 """
 
+import dataclasses
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
@@ -46,6 +47,7 @@ class Nodal:
     rotations: np.ndarray
     where: str = ""  # of the elements that are added, for messages
     element: np.ndarray = field(default_factory=lambda: np.empty(0, np.int64))
+    limp: bool = False  # what is added now has no stiffness
 
     @staticmethod
     def zeros(n: int) -> "Nodal":
@@ -67,6 +69,8 @@ class Nodal:
             if not np.all((value >= 0) & (value < np.inf)):
                 self.refuse(value)
             value = value[given]
+            if self.limp and (target is self.stiffness or target is self.rotational_stiffness):
+                continue
             if value.any():
                 target += np.bincount(nodes[given], weights=value, minlength=len(target))
 
@@ -79,28 +83,41 @@ class Nodal:
         )
 
 
-def nodal(deck: Deck, in_scene: np.ndarray | None = None) -> Nodal:
-    """What all elements and added masses give to the nodes. in_scene: of which springs (bool per spring) the scene
-    holds the stiffness itself, so that only their mass counts here."""
+def nodal(deck: Deck, in_scene: dict[str, np.ndarray] | None = None) -> Nodal:
+    """What all elements and added masses give to the nodes. in_scene: by kind, of which elements (bool per element) the
+    scene holds the stiffness itself, so that only their mass counts here."""
     found = Nodal.zeros(len(deck.node_id))
     for kind, elements in deck.elements.items():
         function = FUNCTIONS[kind]
+        held = (in_scene or {}).get(kind, np.zeros(len(elements.id), bool))
         for part, prop, material, members in deck.part_values(elements.part):
-            some = Elements(kind, *(getattr(elements, key)[members] for key in ("id", "nodes", "part", "thickness")))
             where = f"{part.where or deck.file}: {part.name}"
-            found.where, found.element = where, some.id
-            with np.errstate(all="ignore"):
-                if kind == "spring":
-                    held = np.zeros(len(members), bool) if in_scene is None else in_scene[members]
-                    function(found, deck, some, prop, held)
-                else:
+            for limp in (False, True):
+                rows = members[held[members] == limp]
+                if not len(rows):
+                    continue
+                found.limp = limp
+                some = Elements(kind, *(getattr(elements, key)[rows] for key in ("id", "nodes", "part", "thickness")))
+                found.where, found.element = where, some.id
+                with np.errstate(all="ignore"):
                     function(found, deck, some, part, prop, material, where)
+    found.limp = False
     for nodes, mass in deck.added_mass:
         np.add.at(found.mass, nodes, mass)
     for nodes, inertia in deck.added_inertia:
         np.add.at(found.inertia, nodes, inertia)
         found.rotations[nodes] = True
     return found
+
+
+def structural_mass(deck: Deck, parts: set[int]) -> np.ndarray:
+    """Mass that the elements of some parts give to the nodes of the deck."""
+    wanted = np.array(sorted(parts), np.int64)
+    some = dataclasses.replace(deck, elements={}, added_mass=[], added_inertia=[])
+    for kind, one in deck.elements.items():
+        rows = np.isin(one.part, wanted)
+        some.elements[kind] = Elements(kind, *(getattr(one, k)[rows] for k in ("id", "nodes", "part", "thickness")))
+    return nodal(some).mass
 
 
 def shell4(found: Nodal, deck: Deck, some: Elements, part, prop, material, where: str):
@@ -196,7 +213,9 @@ def brick(found: Nodal, deck: Deck, some: Elements, part, prop, material, where:
     x = deck.position[nodes]
     volume = hex_volume(x)
     mass = material.density * volume / 8
-    if deck.shape_lumping:
+    if material.per_area:
+        mass = material.density * shell_area((x[:, :4] + x[:, 4:]) / 2) / 8
+    elif deck.shape_lumping:
         exact, shares = lumping.hex_shares(x)
         mass = material.density * exact[:, None] * shares
     rotary = bool(prop.values.get("rotary"))
@@ -279,7 +298,7 @@ def beam(found: Nodal, deck: Deck, some: Elements, part, prop, material, where: 
     found.add(some.nodes, mass, inertia, area * young / damped, np.maximum(g * ixx, phi * young * bending) / damped)
 
 
-def spring(found: Nodal, deck: Deck, some: Elements, prop, in_scene: np.ndarray):
+def spring(found: Nodal, deck: Deck, some: Elements, part, prop, material, where: str):
     """rmass.F, rinit3.F."""
     if prop is None or prop.kind != "spring":
         return
@@ -300,10 +319,9 @@ def spring(found: Nodal, deck: Deck, some: Elements, prop, in_scene: np.ndarray)
     if values["type"] == "beam":
         kr = kr + max(values["stiffness"][1:]) / scale * length**2
         cr = cr + max(values["damping"][1:]) / scale * length**2
-    out = ~in_scene
-    found.add(some.nodes, stiffness=np.where(out, damped_stiffness(k, c, mass), 0.0))
+    found.add(some.nodes, stiffness=damped_stiffness(k, c, mass))
     if turning:
-        found.add(some.nodes, rotational_stiffness=np.where(out, damped_stiffness(kr, cr, inertia), 0.0))
+        found.add(some.nodes, rotational_stiffness=damped_stiffness(kr, cr, inertia))
 
 
 def damped_stiffness(k: np.ndarray, c: np.ndarray, m: np.ndarray) -> np.ndarray:

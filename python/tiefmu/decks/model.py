@@ -25,13 +25,15 @@ TURNING = (*SHELLS, "shell8", "shell9", "shell6", "beam")  # elements whose node
 
 @dataclass
 class Elements:
-    """Elements of one kind: id (n), nodes (n, KINDS[kind]), part (n, ids), thickness (n; of shells, 0: the part's)."""
+    """Elements of one kind: id (n), nodes (n, KINDS[kind]), part (n, ids), thickness (n; of shells, 0: the part's);
+    second_axis (n, 3): of beams, the side of their second axis, or None; a row of zeros: not given."""
 
     kind: str
     id: np.ndarray
     nodes: np.ndarray
     part: np.ndarray
     thickness: np.ndarray
+    second_axis: np.ndarray | None = None
 
 
 @dataclass
@@ -65,7 +67,7 @@ class Property:
 @dataclass
 class Material:
     """density, young, poisson; damping: dm of shells where their property gives none, and the same always (None: the
-    property's counts). void: no stiffness."""
+    property's counts). void: no stiffness; per_area: the density is one per area, of the faces that solids join."""
 
     id: int
     law: str = ""
@@ -76,6 +78,7 @@ class Material:
     damping: float = 0.0
     undamped: bool = False
     void: bool = False
+    per_area: bool = False
     where: str = ""
 
 

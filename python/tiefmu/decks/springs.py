@@ -1,95 +1,165 @@
-"""Springs of a deck that a scene holds: which, and as what.
+"""Springs, beams and trusses of a deck that a scene holds: which, and as what.
 
-A scene knows an axial spring and a bushing with axes of the inertial frame. A beam-like spring of axial stiffness k1
-and shear stiffness k2 along a direction of its own is a bushing k2 in all directions and an axial spring k1 - k2.
+A scene knows an axial spring, a bushing with axes of the inertial frame, and a beam between two nodes whose axes turn
+with it. What has a length and can bend is a beam; what has none, or acts along fixed directions, a bushing.
 """
+
+from collections import Counter
 
 import numpy as np
 
+from .beams import beam_stiffness
 from .model import Deck
 
 EPS = 1e-9
+WORDS = {"spring": "springs", "beam": "beams", "truss": "trusses"}
+NAMES = ("stiffness", "damping", "rotational_stiffness", "rotational_damping")
 
 
-def spring_tables(deck: Deck, slave: np.ndarray, tied: np.ndarray, loose: np.ndarray):
-    """([[spring]] tables in the deck's units, which springs they hold, nodes at their ends): of springs with an end
-    that is a slave or a free node of the scene."""
-    springs = deck.elements.get("spring")
-    if springs is None:
-        return [], None, np.empty(0, np.int64)
-    held = np.zeros(len(springs.id), bool)
-    tables, ends, nonlinear = [], [], {}
+def held_by_scene(deck: Deck, slave: np.ndarray, tied: np.ndarray, loose: np.ndarray) -> dict[str, np.ndarray]:
+    """Which springs, beams and trusses the scene holds, a mask for each kind: those with an end that is a slave or a
+    free node of the scene."""
+    found = {}
     active = slave | (loose & tied)
-    for _, prop, _, members in deck.part_values(springs.part):
-        if prop is None:
+    for kind in WORDS:
+        elements = deck.elements.get(kind)
+        if elements is None:
             continue
-        both = springs.nodes[members]
-        some = members[(active[both] & (both >= 0)).any(axis=1)]
-        if not len(some):
-            continue
-        if prop.kind != "spring":
-            deck.warn(f"{prop.where}: {len(some)} springs at tied nodes are of a type that is not understood")
-            continue
-        if prop.values.get("nonlinear"):
-            nonlinear[prop.where] = (len(some), prop.values["nonlinear"][0])
-        for index in some:
-            a, b = springs.nodes[index]
-            found = tables_of(deck, prop, a, b, springs.id[index])
-            place = (
-                {"nodes": [int(deck.node_id[a]), int(deck.node_id[b])]}
-                if b >= 0
-                else {"ground": [int(deck.node_id[a])]}
+        held = found[kind] = np.zeros(len(elements.id), bool)
+        for _, prop, material, members in deck.part_values(elements.part):
+            if prop is None:
+                continue
+            both = elements.nodes[members]
+            some = members[(active[both] & (both >= 0)).any(axis=1)]
+            if not len(some):
+                continue
+            if kind == "spring" and prop.kind != "spring":
+                deck.warn(f"{prop.where}: {len(some)} springs at tied nodes are of a type that is not understood")
+            elif kind == "spring":
+                held[some] = True
+                if prop.values.get("nonlinear"):
+                    function = prop.values["nonlinear"][0]
+                    deck.warn(
+                        f"{prop.where}: {len(some)} springs follow function {function}; only their linear part is taken"
+                    )
+            elif prop.kind == kind and prop.values.get("area") and material and material.young and not material.void:
+                held[some] = ~in_one_body(deck, elements.nodes[some])
+    return found
+
+
+def in_one_body(deck: Deck, nodes: np.ndarray) -> np.ndarray:
+    """Whether both nodes of a row (n, 2) belong to one rigid body."""
+    found = np.zeros(len(nodes), bool)
+    for body in deck.rigid:
+        members = np.zeros(len(deck.node_id), bool)
+        members[body.nodes] = True
+        if body.main >= 0:
+            members[body.main] = True
+        found |= members[nodes].all(axis=1)
+    return found
+
+
+def spring_tables(deck: Deck, held: dict[str, np.ndarray], turns: np.ndarray) -> tuple[list[dict], np.ndarray]:
+    """([[spring]] tables in the deck's units, nodes at their ends) of what the scene holds. turns: per node of the
+    deck, whether a moment can act on it."""
+    tables, ends = [], []
+    pinned: Counter[str] = Counter()
+    for kind, mask in held.items():
+        elements = deck.elements[kind]
+        for _, prop, material, members in deck.part_values(elements.part):
+            for index in members[mask[members]]:
+                a, b = elements.nodes[index]
+                values = prop.values
+                if kind != "spring":
+                    values = as_spring(deck, kind, prop, material, elements, index)
+                made, lost = tables_of(deck, values, prop.where, a, b, turns)
+                if lost:
+                    pinned[prop.where] += 1
+                place = (
+                    {"nodes": [int(deck.node_id[a]), int(deck.node_id[b])]}
+                    if b >= 0
+                    else {"ground": [int(deck.node_id[a])]}
+                )
+                tables += [place | table for table in made]
+                ends += [a, b] if b >= 0 else [a]
+        if mask.any():
+            deck.notes.append(
+                f"{mask.sum()} {WORDS[kind]} at slaves or free nodes are in the scene"
+                + (" with their linear stiffness" if kind != "spring" else "")
+                + "; the others are the host's"
             )
-            tables += [place | table for table in found]
-            ends += [a, b] if b >= 0 else [a]
-        held[some] = True
-    for where, (count, function) in nonlinear.items():
-        deck.warn(f"{where}: {count} springs follow function {function}; only their linear part is taken")
-    if tables:
-        deck.notes.append(f"{held.sum()} springs at slaves or free nodes are in the scene; the others are the host's")
-    return tables, held, np.unique(np.array(ends, np.int64))
+    for where, count in pinned.items():
+        deck.warn(
+            f"{where}: {count} of its elements end at nodes that cannot turn; what would bend or turn them there is "
+            "left out"
+        )
+    return tables, np.unique(np.array(ends, np.int64))
 
 
-def tables_of(deck: Deck, prop, a: int, b: int, number: int) -> list[dict]:
-    """One or two tables for a spring between the nodes a and b, or a and the ground where b is -1."""
-    values = prop.values
+def as_spring(deck: Deck, kind: str, prop, material, elements, index: int) -> dict:
+    """A beam or truss as a spring between its nodes: theory (3.15)."""
+    a, b = elements.nodes[index]
+    length = float(np.linalg.norm(deck.position[b] - deck.position[a]))
+    if kind == "truss":
+        k, kr = [material.young * prop.values["area"] / length, 0.0, 0.0], [0.0] * 3
+    else:
+        k, kr = beam_stiffness(prop.values, material, length)
+    side = prop.values.get("second_axis") if elements.second_axis is None else elements.second_axis[index]
+    zero = [0.0] * 3
+    return {"type": "beam", "side": side} | dict(zip(NAMES, (k, zero, kr, zero)))
+
+
+def tables_of(deck: Deck, values: dict, where: str, a: int, b: int, turns: np.ndarray) -> tuple[list[dict], bool]:
+    """One or two tables for a spring between the nodes a and b, or a and the ground where b is -1; whether moments are
+    left out, as an end cannot turn."""
     axis = deck.position[b] - deck.position[a] if b >= 0 else np.zeros(3)
     length = float(np.linalg.norm(axis))
     scale = length if values.get("per_length") else 1.0
-    k, c, kr, cr = (
-        np.array(values[key]) / scale for key in ("stiffness", "damping", "rotational_stiffness", "rotational_damping")
-    )
+    k, c, kr, cr = (np.array(values[key], float) / scale for key in NAMES)
     if values["type"] == "axial":
-        return [{"kind": "axial", "stiffness": float(k[0]), "damping": float(c[0])}]
-    frame = frame_of(deck, values, axis, length)
-    tables = []
+        return [{"kind": "axial", "stiffness": float(k[0]), "damping": float(c[0])}], False
+    turning = bool(turns[a] and (b < 0 or turns[b]))
+    if values["type"] == "beam" and length > 0:
+        stiff_aside = any(vector.any() for vector in (k[1:], c[1:], kr, cr))
+        if not stiff_aside or not turning:
+            return [{"kind": "axial", "stiffness": float(k[0]), "damping": float(c[0])}], stiff_aside
+        table: dict = {"kind": "beam"} | given(k, c, kr, cr)
+        if not all(same(vector[1:]) for vector in (k, c, kr, cr)):
+            table["orientation"] = side_of(deck, values, axis / length).tolist()
+        return [table], False
+    frame = frame_of(deck, values)
+    lost = not turning and bool(kr.any() or cr.any())
+    if lost:
+        kr, cr = np.zeros((2, 3))
     if aligned(frame) or all(same(vector) for vector in (k, c, kr, cr)):
         bushing = [to_axes(frame, vector) for vector in (k, c, kr, cr)]
-    elif same(k[1:]) and same(c[1:]) and k[0] >= k[1] and c[0] >= c[1] and length > 0 and values["type"] == "beam":
-        bushing = [np.full(3, k[1]), np.full(3, c[1]), mean(deck, prop, kr), mean(deck, prop, cr)]
-        if k[0] > k[1] or c[0] > c[1]:
-            tables.append({"kind": "axial", "stiffness": float(k[0] - k[1]), "damping": float(c[0] - c[1])})
     else:
-        bushing = [mean(deck, prop, vector) for vector in (k, c, kr, cr)]
-    names = ("stiffness", "damping", "rotational_stiffness", "rotational_damping")
-    tables.insert(
-        0, {"kind": "bushing"} | {n: v.tolist() for n, v in zip(names, bushing) if v.any() or n == "stiffness"}
-    )
-    return tables
+        bushing = [mean(deck, where, vector) for vector in (k, c, kr, cr)]
+    return [{"kind": "bushing"} | given(*bushing)], lost
 
 
-def frame_of(deck: Deck, values: dict, axis: np.ndarray, length: float) -> np.ndarray:
-    """Axes of a spring as rows: of its skew, or (beam-like) along it and by the global y axis: r4buf3.F."""
-    skew = deck.frames.get(values.get("skew", 0))
-    if values["type"] != "beam" or length == 0:
-        return np.eye(3) if skew is None else skew
-    x = axis / length
-    y = np.array([0.0, 1.0, 0.0]) if skew is None else skew[1]
+def given(*vectors: np.ndarray) -> dict:
+    return {name: v.tolist() for name, v in zip(NAMES, vectors) if v.any() or name == "stiffness"}
+
+
+def side_of(deck: Deck, values: dict, x: np.ndarray) -> np.ndarray:
+    """Second axis of a beam along x: on the side that it names, or of its skew's y axis, or of the global one."""
+    y = values.get("side")
+    if y is None:
+        skew = deck.frames.get(values.get("skew", 0))
+        y = np.array([0.0, 1.0, 0.0]) if skew is None else skew[1]
     y = y - (y @ x) * x
     if np.linalg.norm(y) < 1e-6:
         y = np.array([0.0, 0.0, 1.0]) - x[2] * x
-    y = y / np.linalg.norm(y)
-    return np.stack([x, y, np.cross(x, y)])
+    if np.linalg.norm(y) < 1e-6:
+        y = np.array([0.0, 1.0, 0.0])
+    return y / np.linalg.norm(y)
+
+
+def frame_of(deck: Deck, values: dict) -> np.ndarray:
+    """Axes of a spring without length, or with fixed directions, as rows."""
+    skew = deck.frames.get(values.get("skew", 0))
+    return np.eye(3) if skew is None else skew
 
 
 def aligned(frame: np.ndarray) -> bool:
@@ -106,10 +176,10 @@ def to_axes(frame: np.ndarray, vector: np.ndarray) -> np.ndarray:
     return (frame**2 * vector[:, None]).sum(axis=0) if not same(vector) else vector
 
 
-def mean(deck: Deck, prop, vector: np.ndarray) -> np.ndarray:
+def mean(deck: Deck, where: str, vector: np.ndarray) -> np.ndarray:
     if not same(vector):
         deck.warn(
-            f"{prop.where}: its axes are not those of the scene; the mean of its three stiffnesses is taken where they "
+            f"{where}: its axes are not those of the scene; the mean of its three stiffnesses is taken where they "
             "differ"
         )
     return np.full(3, vector.mean())

@@ -16,7 +16,7 @@ from ..units import DIMENSIONS, LENGTHS, MASSES, TIMES
 from .element_properties import Nodal, nodal
 from .model import TURNING, Deck, Faces, Tie
 from .shared_slaves import settle_shared
-from .springs import spring_tables
+from .springs import held_by_scene, spring_tables
 from .surfaces import match_rows
 
 
@@ -51,11 +51,12 @@ def convert(deck: Deck, free: tuple[str, ...] = ()) -> Written:
     refuse_slave_masters(deck, slave, master)
     loose = free_nodes(deck, free)
     held = hold(deck, slave, master, loose)
-    springs, in_scene, ends = spring_tables(deck, slave, master | slave, loose & ~held["fixed"])
-    used = slave | master
-    used[ends] = True
+    in_scene = held_by_scene(deck, slave, master | slave, loose & ~held["fixed"])
     values = nodal(deck, in_scene)
     drop_rotations(deck, values, slave)
+    springs, ends = spring_tables(deck, in_scene, values.rotations)
+    used = slave | master
+    used[ends] = True
     chosen = np.flatnonzero(used)
     chosen = chosen[np.argsort(deck.node_id[chosen])]
     scale = Scale(deck)

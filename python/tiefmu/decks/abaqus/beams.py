@@ -29,7 +29,14 @@ def read(sections, block: Block) -> tuple[dict, int]:
         )
         return nothing(), 0
     area, i11, i22, j = by_sizes(block, shape, values)
-    return {"area": area, "iyy": i11, "izz": i22, "ixx": j}, material
+    return {"area": area, "iyy": i11, "izz": i22, "ixx": j, "second_axis": first_direction(block)}, material
+
+
+def first_direction(block: Block) -> np.ndarray:
+    """n1, about which I11 counts; default -z."""
+    given = np.array((block.data(1) + [0.0] * 3)[:3])
+    given[~np.isfinite(given)] = 0.0
+    return given if given.any() else np.array([0.0, 0.0, -1.0])
 
 
 def by_sizes(block: Block, shape: str, values: list[float]) -> tuple[float, float, float, float]:
@@ -115,4 +122,5 @@ def general(sections, block: Block, values: list[float]) -> tuple[dict, int]:
     sections.deck.materials[number] = Material(
         number, "section", "", float(density), young, poisson, void=not young, where=block.where
     )
-    return {"area": area, "iyy": i11, "izz": i22, "ixx": j}, number
+    axis = first_direction(block)
+    return {"area": area, "iyy": i11, "izz": i22, "ixx": j, "second_axis": axis}, number

@@ -47,7 +47,10 @@ def one(source: Source, scope: Scope, block: Block, name: str, line: int, items:
     if kind not in ("NODETOSURFACE", "SURFACETOSURFACE"):
         block.fail(f"tie '{name}': TYPE = {block.get('TYPE')} is not understood")
     if kind == "SURFACETOSURFACE":
-        said.append("SURFACE TO SURFACE is taken as NODE TO SURFACE")
+        deck.warn(
+            f"{block.where}: tie '{name}': SURFACE TO SURFACE is taken as NODE TO SURFACE: slaves follow the surface "
+            "at their own projections"
+        )
     chosen_nodes = None
     if block.get("TIED NSET"):
         chosen_nodes = source.nodes(scope, block.get("TIED NSET"), block)

@@ -11,7 +11,7 @@ import numpy as np
 from ..._core import SceneError
 from ...units import LENGTHS, MASSES, TIMES
 from ..choice import Choice
-from ..model import Deck, Material, Property
+from ..model import SOLIDS, Deck, Material, Property
 from ..selected import Selected
 from ..units import check
 from . import files, keywords, loads, materials, mesh, ties
@@ -168,23 +168,26 @@ def read_ties(deck: Deck, sets: Sets, tables: Tables, blocks: list[Block], wante
             offsets[tie.name] = kind.offset
     choice.finish()
     ties.share_masters(deck)
-    say_beams(deck)
+    say_solid_welds(deck)
     return offsets
 
 
-def say_beams(deck: Deck):
-    """Beams between slaves, such as those of spot welds, are no springs of the scene."""
+def say_solid_welds(deck: Deck):
+    """Spot welds of solids at slaves, whose forces are not in the scene."""
     slaves = np.unique(np.concatenate([tie.slaves for tie in deck.ties]))
-    for kind in ("beam", "truss"):
+    for kind in SOLIDS:
         elements = deck.elements.get(kind)
         if elements is None:
             continue
-        held = np.isin(elements.nodes, slaves).any(axis=1)
-        if held.any():
-            deck.notes.append(
-                f"{held.sum()} {kind}s at slaves, the first is element {elements.id[np.argmax(held)]}, are the host's: "
-                "their masses are in the scene, their forces are inputs"
-            )
+        for part, _, material, members in deck.part_values(elements.part):
+            if material is None or materials.number_of(material.law) != 100:
+                continue
+            count = int(np.isin(elements.nodes[members], slaves).any(axis=1).sum())
+            if count:
+                deck.warn(
+                    f"{part.where}: {count} solids of spot welds are at slaves: the scene has their masses, not their "
+                    "forces, which the host gives to the slaves"
+                )
 
 
 def read_masses(deck: Deck, sets: Sets, of):
@@ -194,7 +197,7 @@ def read_masses(deck: Deck, sets: Sets, of):
         loads.mass_of_parts(deck, sets, block)
     for block in of("ELEMENT_INERTIA"):
         loads.inertia(deck, block)
-    loads.mass_per_area(deck)
+    loads.mass_of_sections(deck)
 
 
 def read_loads(deck: Deck, sets: Sets, tables: Tables, of, codes, offsets: dict):

@@ -12,9 +12,9 @@ from typing import NoReturn
 import numpy as np
 
 from ...schema import shortened
+from .. import parameters
 from ..card_block import CardBlock
 from ..numbers import column, real, whole
-from . import parameters
 
 # Width of a field by its letter: i, r, s integer, real, text, . left out; I, F integer and real of nodes and elements,
 # , one left out; R real of nodes and elements; Q real of curves.

@@ -6,7 +6,7 @@ from pathlib import Path, PureWindowsPath
 
 from ..._core import SceneError
 from ...schema import shortened
-from . import parameters
+from .. import parameters
 from .cards import Block, Origin
 
 MOST_INCLUDES = 1000

@@ -243,17 +243,19 @@ def element_sizes(deck: Deck, kind: str, nodes: np.ndarray) -> np.ndarray:
     return np.linalg.norm(x[:, 1] - x[:, 0], axis=1)
 
 
-def mass_per_area(deck: Deck):
-    """MAREA of *SECTION_SHELL."""
-    for kind in SHELLS:
+def mass_of_sections(deck: Deck):
+    """MAREA of *SECTION_SHELL, NSM of *SECTION_BEAM."""
+    for kind, key in [(kind, "per_area") for kind in SHELLS] + [
+        (kind, "mass_per_length") for kind in ("beam", "truss")
+    ]:
         one = deck.elements.get(kind)
         if one is None:
             continue
         for _, prop, _, members in deck.part_values(one.part):
-            per_area = prop.values.get("per_area", 0.0) if prop else 0.0
-            if per_area:
+            added = prop.values.get(key, 0.0) if prop else 0.0
+            if added:
                 nodes = one.nodes[members]
-                share = per_area * element_sizes(deck, kind, nodes) / nodes.shape[1]
+                share = added * element_sizes(deck, kind, nodes) / nodes.shape[1]
                 deck.added_mass += [(nodes[:, column], share) for column in range(nodes.shape[1])]
 
 

@@ -108,9 +108,9 @@ def constants(deck, found: Materials, block: Block, first: int, material: Materi
     _, _, *a = block.read(first, "irrrrrrr")
     if law in NO_STIFFNESS:
         material.void = True
-        if law != 9 and a[0]:
-            deck.warn(f"{block.where}: its density counts per area (ROFLG) and is left out")
-            material.density = 0.0
+        material.per_area = law != 9 and a[0] == 1
+        if material.per_area:
+            material.density *= block.origin.length  # which has been read as one per volume
     elif law in YOUNG_POISSON:
         material.young, material.poisson = a[0], a[1]
     elif law in YOUNG_ONLY:

@@ -63,12 +63,16 @@ class Collected:
     def __init__(self, deck: Deck):
         self.deck = deck
         self.groups: dict[str, list[tuple]] = {}
+        self.sides: dict[str, list[np.ndarray]] = {}
 
-    def add(self, kind: str, block: Block, cards, ids, nodes, part, thickness=None):
-        """ids, nodes and part with their offsets; nodes as indices. cards: where each element stands."""
+    def add(self, kind: str, block: Block, cards, ids, nodes, part, thickness=None, side=None):
+        """ids, nodes and part with their offsets; nodes as indices. cards: where each element stands; side: of beams,
+        see Elements.second_axis."""
         if not len(ids):
             return
         thickness = np.zeros(len(ids)) if thickness is None else thickness
+        if side is not None:
+            self.sides.setdefault(kind, []).append(side)
         self.groups.setdefault(kind, []).append((ids, nodes, part, thickness, block, cards))
 
     def finish(self):
@@ -82,7 +86,8 @@ class Collected:
                 *_, block, cards = groups[number]
                 row = int(twice[0] - (ends[number - 1] if number else 0))
                 block.fail(f"element {parts[0][twice[0]]} is repeated", int(cards[row]))
-            self.deck.elements[kind] = Elements(kind, *parts)
+            side = np.concatenate(self.sides[kind]) if kind in self.sides else None
+            self.deck.elements[kind] = Elements(kind, *parts, side)
 
 
 def known(deck: Deck, block: Block, cards, ids, part, nodes, optional: int) -> np.ndarray:
@@ -213,22 +218,51 @@ def beams(deck: Deck, block: Block, found: Collected, tables: Tables):
     more = extra_cards(block, "ELEMENT_BEAM")
     if more:
         cards = np.arange(0, block.end, 1 + more)
-        columns, _ = block.table("I" * 4, cards)
+        columns, _ = block.table("I" * 9, cards)
     else:
-        columns, cards = block.table("I" * 4)
+        columns, cards = block.table("I" * 9)
     if block.has("THICKNESS", "SECTION", "SCALAR", "SCALR"):
         deck.warn(f"{block.where}: sections of single elements are left aside; that of the part counts")
+    if block.has("OFFSET"):
+        deck.warn(f"{block.where}: offsets of beams are left aside")
     ids, part = columns[0] + block.origin.element, columns[1] + block.origin.part
-    nodes = np.stack(columns[2:4], axis=1)
+    nodes = np.stack(columns[2:5], axis=1)
+    released = np.stack(columns[5:9], axis=1).any(axis=1)
+    if released.any():
+        deck.warn(
+            f"{block.at(int(cards[np.argmax(released)]))}: {released.sum()} beams let go of directions at an end (RT, "
+            "RR), which is left aside"
+        )
     grounded = nodes[:, 1] == 0
     if grounded.any():
         deck.warn(f"{block.at(int(cards[np.argmax(grounded)]))}: {grounded.sum()} beams have one node and are left out")
         cards, ids, part, nodes = cards[~grounded], ids[~grounded], part[~grounded], nodes[~grounded]
     index = known(deck, block, cards, ids, part, nodes, 2)
+    side = sides_of_beams(deck, block, cards, index)
     kinds = {number: tables.beam_kind(number) for number in np.unique(part).tolist()}
     for kind in ("beam", "truss", "spring"):
         which = np.isin(part, [number for number, one in kinds.items() if one == kind])
-        found.add(kind, block, cards[which], ids[which], index[which], part[which])
+        found.add(
+            kind,
+            block,
+            cards[which],
+            ids[which],
+            index[which, :2],
+            part[which],
+            side=side[which] if kind == "beam" else None,
+        )
+
+
+def sides_of_beams(deck: Deck, block: Block, cards: np.ndarray, index: np.ndarray) -> np.ndarray:
+    """Where the second (s) axis of beams looks to: from N1 to N3, or the vector of _ORIENTATION; zeros where neither is
+    given. index: N1, N2, N3."""
+    if block.has("ORIENTATION"):
+        words = block.words
+        before = words[: words.index("ORIENTATION")]
+        vectors, _ = block.table("rrr", cards + 1 + sum(MORE["ELEMENT_BEAM"].get(word, 0) for word in before))
+        return np.stack(vectors, axis=1)
+    third = np.where(index[:, 2] < 0, index[:, 0], index[:, 2])
+    return deck.position[third] - deck.position[index[:, 0]]
 
 
 def discrete(deck: Deck, block: Block, found: Collected, tables: Tables):

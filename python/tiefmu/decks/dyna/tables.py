@@ -149,11 +149,13 @@ class Tables:
         return card + 1 + (math.ceil(max(points, 1) / 8) if composite == 1 else 0)
 
     def beam(self, block: Block, card: int, found: Property) -> int:
-        _, elform, _, rule, form, system = block.read(card, "irrrrr")
+        _, elform, shear, rule, form, system, per_length = block.read(card, "irrrrrr")
         elform = int(elform) or 1
         length = block.origin.unit(length=1)
         words = block.fields(card + 1, "s" * 8)
         found.values = {"elform": elform, "system": int(system)}
+        if elform not in (6, 9):
+            found.values["mass_per_length"] = per_length * block.origin.unit(length=-1, mass=1)
         if words[0].upper().startswith("SECTION") or block.has("AISC"):
             pass  # a shape by name and dimensions
         elif elform in INTEGRATED and rule >= 0 and form in (0, 1):
@@ -161,10 +163,14 @@ class Tables:
             s, t = (s1 + (s2 or s1)) / 2 * length, (t1 + (t2 or t1)) / 2 * length
             found.values |= (tube if form == 1 else rectangle)(s, t)
             found.kind = "beam"
+            # Hughes-Liu shears at its one integration point, Belytschko-Schwer does not shear
+            found.values["one_point"] = elform in (1, 9, 11)
+            found.values["shear_area"] = found.values["area"] * (shear or 1.0) if elform in (1, 9, 11) else 0.0
         elif elform in RESULTANT:
-            a, iss, itt, j = block.read(card + 1, "rrrr")
+            a, iss, itt, j, shear_area = block.read(card + 1, "rrrrr")
             iss, itt, j = iss * length**4, itt * length**4, j * length**4
             found.values |= {"area": a * length**2, "iyy": iss, "izz": itt, "ixx": j or iss + itt}
+            found.values["shear_area"] = shear_area * length**2
             found.kind = "beam"
         elif elform == 3:
             found.kind, found.values["area"] = "truss", block.read(card + 1, "r")[0] * length**2
@@ -193,7 +199,7 @@ class Tables:
         plain = v["axes"] == 0
         made = Property(self.fresh(self.deck.properties), "spring", "discrete beam", section.title, where=part.where)
         made.values = {
-            "type": "beam" if abs(v["system"]) in (2, 3, 12, 13) and plain else "general",
+            "type": "beam" if abs(v["system"]) in (2, 12) and plain else "general",
             "mass": material.density * v["volume"] if material else 0.0,
             "inertia": v["inertia"],
             "skew": 0,

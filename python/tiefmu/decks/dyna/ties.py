@@ -61,11 +61,8 @@ def kind_of(name: str) -> Kind | None:
 
 
 def bare(block: Block) -> str:
-    """The contact's name without CONTACT_ and options."""
-    words = block.words[1:]
-    while words and words[-1] in OPTIONS:
-        words = words[:-1]
-    return "_".join(word for word in words if word != "MPP")
+    """The contact's name without CONTACT_ and options, which may stand before _OFFSET."""
+    return "_".join(word for word in block.words[1:] if word not in OPTIONS)
 
 
 def headed(block: Block, card: int) -> tuple[int, str]:
@@ -108,7 +105,8 @@ class Contact:
         self.slave_type, self.master_type, self.slave_box, self.master_box = types
         self.birth, self.death = block.or_blank(self.first + 1, "......rr")
         _, _, self.sst, self.mst, self.sfst, self.sfmt = block.or_blank(self.first + 2, "rrrrrr")
-        *_, self.solid_thickness = block.or_blank(self.first + 4, "rrrrrrr")  # optional card B, SLDTHK
+        fourth = block.has("TIEBREAK", "WELD")  # which have a card of their own before the optional ones
+        *_, self.solid_thickness = block.or_blank(self.first + 4 + fourth, "rrrrrrr")  # optional card B, SLDTHK
         unit = block.origin.unit(length=1)
         self.sst, self.mst, self.solid_thickness = self.sst * unit, self.mst * unit, self.solid_thickness * unit
 

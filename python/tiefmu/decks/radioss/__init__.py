@@ -9,7 +9,7 @@ import numpy as np
 
 from ..choice import Choice
 from ..model import Deck
-from . import loads, mesh, tables, ties, units
+from . import layers, loads, mesh, parameters_of_deck, tables, ties, units
 from .cards import Block
 from .cards import read as read_blocks
 from .keywords import MATTERS, USED, encrypted, reason
@@ -42,18 +42,19 @@ def read(path: Path, file: str, wanted: list[str] | None = None) -> Deck:
     for block in blocks:
         if block.key[0] not in ("NODE", *mesh.ELEMENTS) and encrypted(block):
             block.fail("is encrypted and cannot be read")
+    parameters_of_deck.define(blocks)
     begin = next(iter(of("BEGIN")), None)
-    said = units.read(deck, begin)
+    said = units.read(deck, begin, of("UNIT"))
     titles = of("TITLE")
     deck.title = titles[0].lines[0].decode("utf-8", "replace").strip() if titles and titles[0].lines else ""
     node_blocks = of("NODE", "CNODE")
     for block in of("NODE", "CNODE"):
-        if block.word(1).isdecimal() and block.word(1).strip("0"):
-            block.fail(f"its unit {block.word(1)} is not supported; give it in the units of /BEGIN")
+        tables.refuse_unit(block, 1)
     node_block = mesh.read_nodes(deck, node_blocks)
     subsets = mesh.read_parts(deck, of("PART"))
     unknown = tables.read_properties(deck, of("PROP"), default_shell(of("DEF_SHELL")))
     unread = tables.read_materials(deck, [b for b in of("MAT") if len(b.key) > 1])
+    layers.settle(deck)
     mesh.read_elements(deck, of(*mesh.ELEMENTS))
     mesh.check_references(deck)
     warn_of_tables(deck, unknown, unread)
@@ -73,6 +74,8 @@ def read(path: Path, file: str, wanted: list[str] | None = None) -> Deck:
         loads.imposed(deck, sets, block)
     for block in of("RBODY"):
         loads.rbody(deck, sets, block)
+    for block in of("RBE2"):
+        loads.rbe2(deck, sets, block)
     for block in of("INIVEL"):
         loads.inivel(deck, sets, block)
     functions = loads.functions_of(of("FUNCT")) if of("GRAV") else {}
@@ -123,6 +126,14 @@ def read_ties(deck: Deck, sets: Sets, blocks: list[Block], default: ties.Default
         else:
             left(deck, block, "contacts are the host's")
     choice.finish()
+    slaves = np.unique(np.concatenate([tie.slaves for tie in deck.ties]))
+    for one in deck.elements.values():
+        for part, prop, _, members in deck.part_values(one.part):
+            if prop is not None and prop.values.get("connects") and np.isin(one.nodes[members], slaves).any():
+                deck.warn(
+                    f"{part.where}: {len(members)} connecting solids are at slaves: the scene has their masses, not "
+                    "their forces, which the host gives to the slaves"
+                )
 
 
 def lookup(deck: Deck, sets: Sets, name: str) -> np.ndarray | None:

@@ -12,6 +12,7 @@ import numpy as np
 
 from ..._core import SceneError
 from ...schema import shortened
+from .. import parameters
 from ..card_block import CardBlock
 from ..numbers import column, real, whole
 
@@ -20,11 +21,13 @@ MOST_INCLUDES = 1000
 
 @dataclass
 class Source:
-    """A deck's files while they are read. version: of the input format, e.g. 2021 or 44."""
+    """A deck's files while they are read. version: of the input format, e.g. 2021 or 44; same_units: ids of /UNIT that
+    are the deck's own."""
 
     file: str
     version: int = 2026
     files: list[str] = field(default_factory=list)
+    same_units: set[int] = field(default_factory=set)
 
     @property
     def old(self) -> bool:
@@ -56,7 +59,7 @@ class Offsets:
 @dataclass
 class Block(CardBlock):
     """key: the keyword's words, e.g. ["INTER", "TYPE2", "7"]; file, number: where it stands; lines: its cards, as
-    bytes; numbers: their lines; files: [(first card, file)] of those in an include."""
+    bytes; numbers: their lines; files: [(first card, file)] of those in an include; scope: what &name is."""
 
     source: Source
     key: list[str]
@@ -66,6 +69,7 @@ class Block(CardBlock):
     lines: list[bytes] = field(default_factory=list)
     numbers: list[int] = field(default_factory=list)
     files: list[tuple[int, str]] = field(default_factory=list)
+    scope: parameters.Scope = field(default_factory=parameters.Scope)
 
     @property
     def name(self) -> str:
@@ -134,6 +138,8 @@ class Cards:
             start += width
             if letter == ".":
                 continue
+            if "&" in text:
+                text = self.parameter(card, text)
             try:
                 found.append(text if letter == "s" else (whole(text) if letter == "i" else real(text)))
             except ValueError:
@@ -149,6 +155,9 @@ class Cards:
         wide = source.integer * (integers + blank) + source.real * reals
         if not lines:
             return np.empty((0, integers), np.int64), np.empty((0, reals)), np.empty(0, int)
+        if any(b"&" in line for line in lines):
+            widths = [source.integer] * (integers + blank) + [source.real] * reals
+            lines = [self.filled(start + step * number, line, widths) for number, line in enumerate(lines)]
         text = np.array(lines, dtype=f"S{wide}")
         text = text.view(np.uint8).reshape(len(lines), wide).copy()
         text[(text == 0) | (text == 9)] = 32
@@ -178,9 +187,33 @@ class Cards:
     def refuse(self, card: int, first: int, width: int, real: bool, word: str):
         self.block.fail(
             f"columns {first + 1} to {first + width}: expected {'a number' if real else 'a whole number'}, found "
-            f"'{shortened(word)}'" + ("; /PARAMETER is not supported" if word.startswith("&") else ""),
+            f"'{shortened(word)}'",
             self.first + card,
         )
+
+    def parameter(self, card: int, word: str) -> str:
+        """A field with the parameter that it names put in."""
+        try:
+            return parameters.field(word, self.block.scope)
+        except KeyError:
+            self.block.fail(f"parameter {shortened(word)} is not in the deck", self.first + card)
+
+    def filled(self, card: int, line: bytes, widths: list[int]) -> bytes:
+        """A card with its parameters put in, as wide as before: a number of a table has at most 17 digits."""
+        if b"&" not in line:
+            return line
+        found, start = [], 0
+        for width in widths:
+            word = line[start : start + width].decode("latin-1").strip()
+            start += width
+            if "&" in word:
+                word = self.parameter(card, word)
+                digits = 17
+                while len(word) > width and digits > 1:
+                    digits -= 1
+                    word = f"{float(word):.{digits}g}"
+            found.append(word.rjust(width))
+        return "".join(found).encode("latin-1")
 
     def ids(self, start: int = 0) -> np.ndarray:
         """All integers of all cards from `start` on, ten to a card, zeros left out; negative ones as they are."""

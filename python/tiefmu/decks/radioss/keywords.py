@@ -6,7 +6,7 @@ USED = {
     "BEGIN", "NODE", "CNODE", "SHELL", "SH3N", "BRICK", "TETRA4", "TETRA10", "PENTA6", "SPRING", "TRUSS", "BEAM",
     "PART", "PROP", "MAT", "GRNOD", "GRSHEL", "GRSH3N", "GRBRIC", "GRSPRI", "GRTRUS", "GRBEAM", "GRPART", "SURF",
     "SET", "SUBSET", "BOX", "ADMAS", "BCS", "IMPVEL", "IMPDISP", "IMPACC", "INIVEL", "GRAV", "RBODY", "FUNCT", "SKEW",
-    "INTER", "TRANSFORM", "DEF_SHELL", "DEFAULT", "SUBMODEL", "UNIT", "TITLE", "VERS",
+    "INTER", "TRANSFORM", "DEF_SHELL", "DEFAULT", "SUBMODEL", "UNIT", "TITLE", "VERS", "PARAMETER", "RBE2",
 }  # fmt: skip
 
 # Left aside: keyword -> why that changes nothing of the tie.
@@ -31,7 +31,6 @@ SAFE = {
 }  # fmt: skip
 # Matter for masses or motions and are not read: each gets a warning with its line.
 MATTERS = {
-    "RBE2": "its nodes are treated as if it were not there",
     "RBE3": "its nodes are treated as if it were not there",
     "RLINK": "its nodes are treated as if it were not there",
     "MPC": "its nodes are treated as if it were not there",
@@ -41,7 +40,6 @@ MATTERS = {
     "RIVET": "it is left out",
     "NBCS": "nodes that it holds are not known to be held",
     "MERGE": "nodes stay apart",
-    "PARAMETER": "fields that name parameters cannot be read",
     "BRIC20": "its elements add no mass and make no surface",
     "SHEL16": "its elements add no mass and make no surface",
     "QUAD": "its elements add no mass and make no surface",

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..element_properties import shell_area
+from ..element_properties import shell_area, structural_mass
 from ..model import Deck, Fixed, Initial, RigidBody
 from .cards import Block
 from .sets import Sets
@@ -58,6 +58,21 @@ def rbody(deck: Deck, sets: Sets, block: Block):
         deck.added_mass.append((np.array([index]), mass))
 
 
+def rbe2(deck: Deck, sets: Sets, block: Block):
+    """A rigid link of a group to its node."""
+    title, cards = block.titled()
+    main, code, _, number = cards.read(0, "isii")
+    if not number or not main:
+        return
+    directions = code.replace(" ", "")
+    if directions.strip("0") and "0" in directions:
+        deck.warn(f"{block.where}: joins directions {code} only; its nodes are treated as if it were not there")
+        return
+    nodes = group(sets, number, block)
+    index = int(deck.nodes([main + block.offsets.node], block.where)[0])
+    deck.rigid.append(RigidBody(title or f"rigid link {block.id(1, 'other')}", index, nodes, block.where))
+
+
 def admas(deck: Deck, sets: Sets, block: Block):
     kind = block.word(1) if len(block.key) > 2 else "0"
     if not kind.isdecimal():
@@ -82,8 +97,34 @@ def admas(deck: Deck, sets: Sets, block: Block):
             mass, node = cards.read(card, "ri")
             if node:
                 deck.added_mass.append((deck.nodes([node + block.offsets.node], block.at(cards.first + card)), mass))
+    elif what in (3, 4):
+        mass, number = cards.read(0, "ri")
+        spread_mass(deck, block, cards.first, mass, sets.parts_of_group(number + block.offsets.other, block), what == 4)
+    elif what in (6, 7):
+        for card in range(len(cards)):
+            mass, part = cards.read(card, "ri")
+            if part:
+                part += block.offsets.part
+                if part not in deck.parts:
+                    block.fail(f"part {part} is not in the deck", cards.first + card)
+                spread_mass(deck, block, cards.first + card, mass, {part}, what == 7)
     else:
-        deck.warn(f"{block.where}: type {kind} spreads mass over parts; it is not added")
+        block.fail(f"expected a type from 0 to 7, found '{kind}'")
+
+
+def spread_mass(deck: Deck, block: Block, card: int, mass: float, parts: set[int], final: bool):
+    """Adds a mass, or what is missing to a final one, in proportion to the parts' own: addmaspart.F."""
+    own = structural_mass(deck, parts)
+    whole = own.sum()
+    if final:
+        if mass <= whole:
+            block.fail(f"its final mass {mass:g} is not more than that of its parts, {whole:g}", card)
+        mass -= whole
+    if not whole > 0:
+        deck.warn(f"{block.at(card)}: its parts have no mass, and nothing is added")
+        return
+    nodes = np.flatnonzero(own)
+    deck.added_mass.append((nodes, mass * own[nodes] / whole))
 
 
 def inivel(deck: Deck, sets: Sets, block: Block):

@@ -42,8 +42,10 @@ def read_nodes(deck: Deck, blocks: list[Block]) -> np.ndarray:
 def read_elements(deck: Deck, blocks: list[Block]):
     """/SHELL and so on, block by block: fills elements."""
     found: dict[str, list] = {}
+    sides = []  # of beams: from the first node to the third, which their second axis looks to
     for block in blocks:
         kind, cards, columns = ELEMENTS[block.key[0]]
+        columns += kind == "beam"
         part = block.id(1, "part")
         if cards == 1:
             thick = kind in ("shell4", "shell3")
@@ -61,7 +63,7 @@ def read_elements(deck: Deck, blocks: list[Block]):
         ids = whole[:, 0] + block.offsets.element
         if block.offsets.node:
             nodes = np.where(nodes == 0, 0, nodes + block.offsets.node)
-        optional = 4 if kind == "tet10" else 3 if kind == "shell4" else columns
+        optional = {"tet10": 4, "shell4": 3, "beam": 2}.get(kind, columns)
         bad = (nodes[:, :optional] <= 0).any(axis=1) | (whole[:, 0] <= 0)
         if bad.any():
             first = int(np.argmax(bad))
@@ -75,6 +77,10 @@ def read_elements(deck: Deck, blocks: list[Block]):
             block.fail(f"element {ids[first]}: node {node} is not in the deck", int(index[first]))
         if part not in deck.parts and len(ids):
             block.fail(f"element {ids[0]}: part {part} is not in the deck", int(index[0]))
+        if kind == "beam":
+            third = np.where(nodes[:, 2] > 0, corners[:, 2], corners[:, 0])
+            sides.append(deck.position[third] - deck.position[corners[:, 0]])
+            corners = corners[:, :2]
         found.setdefault(kind, []).append((ids, corners, np.full(len(ids), part), thickness, block))
     for kind, groups in found.items():
         parts = [np.concatenate([group[i] for group in groups]) for i in range(4)]
@@ -84,7 +90,7 @@ def read_elements(deck: Deck, blocks: list[Block]):
             ends = np.cumsum([len(group[0]) for group in groups])
             block = groups[int(np.searchsorted(ends, twice[0], side="right"))][4]
             block.fail(f"element {parts[0][twice[0]]} is repeated")
-        deck.elements[kind] = Elements(kind, *parts)
+        deck.elements[kind] = Elements(kind, *parts, np.concatenate(sides) if kind == "beam" else None)
 
 
 def read_parts(deck: Deck, blocks: list[Block]) -> dict[int, int]:

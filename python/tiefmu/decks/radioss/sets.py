@@ -208,6 +208,10 @@ class Sets:
             block.fail(f"groups of parts by {block.word(1)} are not understood")
         return found
 
+    def parts_of_group(self, number: int, asker: Block) -> set[int]:
+        """Parts of a /GRPART."""
+        return set().union(*(self.grpart(block) for block in self.find(("GRPART",), number, asker)))
+
     def elements_named(self, kind: str, ids: np.ndarray, block: Block) -> "Selected | None":
         """Elements of parts or of groups of elements."""
         parts = self.parts_named(kind, ids, block)

@@ -3,6 +3,7 @@
 import re
 
 from ..model import Deck, Material, Property
+from . import layers
 from .cards import Block, Cards
 
 PROPERTY_NAMES = {
@@ -43,8 +44,7 @@ PROPERTY_NAMES = {
     "KJOINT2": 45,
     "SPR_MUSCLE": 46,
 }
-LAYERED = (10, 11, 16)
-SHELL_TYPES = (1, 9, *LAYERED)
+SHELL_TYPES = (1, 9, 10, 11, 16, 17, 51)  # 11, 16, 17 and 51 have layers: layers.py
 SOLID_TYPES = (6, 14, 20, 21, 22)
 SPRING_TYPES = (4, 8, 13)
 
@@ -56,7 +56,8 @@ YOUNG_POISSON = {
 }
 # Laws of two or three moduli along axes: number of them, and whether nu12 follows.
 AXES = {12: (3, False), 14: (3, False), 15: (2, True), 19: (2, True), 25: (2, True), 28: (3, False), 68: (3, False)}
-YOUNG_ONLY = {33, 58, 59}
+YOUNG_ONLY = {33, 58}
+CONNECTIONS = {59, 83}  # of solids of type 43, whose moduli count per length
 UNDAMPED = {1, 2, 3, 22, 23}  # dm of a shell does not count: cdleni.F
 LAW_NAMES = {
     "VOID": 0,
@@ -141,8 +142,11 @@ def read_properties(deck: Deck, blocks: list[Block], default_shell: tuple[int, i
         if kind in SHELL_TYPES:
             values = shell(cards, default_shell)
             found = Property(number, "shell", name, title, values, block.where)
-            if kind in LAYERED:
-                deck.warn(f"{block.where}: layers are not read; its elements take the material of their part")
+            layers.read(block, cards, kind, values)
+        elif kind == 19:
+            material, thickness = cards.read(0, "ir")
+            values = {"material": material + block.offsets.material, "thickness": thickness}
+            found = Property(number, "ply", name, title, values, block.where)
         elif kind in SOLID_TYPES:
             found = Property(number, "solid", name, title, solid(cards), block.where)
         elif kind in SPRING_TYPES:
@@ -154,6 +158,8 @@ def read_properties(deck: Deck, blocks: list[Block], default_shell: tuple[int, i
             area, iyy, izz, ixx = cards.read(2, "rrrr")
             values = {"area": area, "iyy": iyy, "izz": izz, "ixx": ixx, "dm": dm, "df": df or 0.01}
             found = Property(number, "beam", name, title, values, block.where)
+        elif kind == 43:  # mass alone: sini43.F
+            found = Property(number, "void", name, title, {"connects": True}, block.where)
         elif kind == 0:
             thickness = cards.read(0, "r")[0] if len(cards) and cards.need(0).strip() else 0.0
             found = Property(number, "void", name, title, {"thickness": thickness}, block.where)
@@ -165,9 +171,10 @@ def read_properties(deck: Deck, blocks: list[Block], default_shell: tuple[int, i
 
 
 def refuse_unit(block: Block, place: int):
-    """A block in units of its own would be misread."""
-    if not block.source.old and block.word(place).isdecimal() and block.word(place).strip("0"):
-        block.fail(f"its unit {block.word(place)} is not supported; give it in the units of /BEGIN")
+    """A block in units of its own would be misread; units that are those of /BEGIN are none of its own."""
+    word = block.word(place)
+    if not block.source.old and word.isdecimal() and word.strip("0") and int(word) not in block.source.same_units:
+        block.fail(f"its unit {word} is not supported; give it in the units of /BEGIN")
 
 
 def shell(cards: Cards, default_shell: tuple[int, int]) -> dict:
@@ -252,6 +259,8 @@ def read_materials(deck: Deck, blocks: list[Block]) -> set[int]:
             found.poisson = max(tension, compression)
         elif law in YOUNG_ONLY:
             found.young = cards.read(1, "r")[0]
+        elif law in CONNECTIONS:
+            found.void, found.per_area = True, cards.read(1, "rri")[2] == 1
         elif law in AXES:
             moduli, poisson = AXES[law]
             read = cards.read(1, "r" * (moduli + poisson))

@@ -28,16 +28,22 @@ def unit(word: str, symbol: str, base: float):
     return factor if 0 < factor < 1e30 else None
 
 
-def read(deck: Deck, begin: Block | None):
-    """Sets deck.units (length, mass, time) from /BEGIN; SceneError for a unit that is none."""
-    words = []
-    if begin is not None and len(begin.lines) > 2:
-        line = begin.lines[2].decode("latin-1")
-        words = [line[i : i + 20].strip() for i in (0, 20, 40)]
-        if not all(words):
-            words = line.split()
+def words_of(line: bytes) -> list[str]:
+    """Words for mass, length and time of a card."""
+    text = line.decode("latin-1")
+    words = [text[i : i + 20].strip() for i in (0, 20, 40)]
+    return words if all(words) else text.split()
+
+
+def read(deck: Deck, begin: Block | None, named: list[Block]):
+    """Sets deck.units (length, mass, time) from /BEGIN; SceneError for a unit that is none. named: /UNIT."""
+    words = words_of(begin.lines[2]) if begin is not None and len(begin.lines) > 2 else []
     if len(words) != 3:
         return None
+    for block in named:
+        cards = block.titled()[1]
+        if len(cards) and words_of(cards.need(0)) == words and block.word(1).isdecimal():
+            block.source.same_units.add(int(block.word(1)))
     mass, length, time = words
     found = (unit(length, "m", 1.0), unit(mass, "g", 1e-3), unit(time, "s", 1.0))
     for word, value in zip((length, mass, time), found):

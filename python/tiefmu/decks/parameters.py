@@ -1,4 +1,4 @@
-"""*PARAMETER and *PARAMETER_EXPRESSION: names for numbers, and arithmetic with them."""
+"""Parameters of a deck: names for numbers, and arithmetic with them."""
 
 import ast
 import math
@@ -6,7 +6,7 @@ import operator
 import re
 from collections.abc import Callable
 
-from ..numbers import real
+from .numbers import real
 
 Value = float | int | str
 LONGEST = 1000  # characters of an expression
