@@ -101,11 +101,11 @@ def as_spring(deck: Deck, kind: str, prop, material, elements, index: int) -> di
     a, b = elements.nodes[index]
     length = float(np.linalg.norm(deck.position[b] - deck.position[a]))
     if kind == "truss":
-        k, kr = [material.young * prop.values["area"] / length, 0.0, 0.0], [0.0] * 3
+        k, kr = np.array([material.young * prop.values["area"] / length, 0.0, 0.0]), np.zeros(3)
     else:
         k, kr = beam_stiffness(prop.values, material, length)
     side = prop.values.get("second_axis") if elements.second_axis is None else elements.second_axis[index]
-    zero = [0.0] * 3
+    zero = np.zeros(3)
     return {"type": "beam", "side": side} | dict(zip(NAMES, (k, zero, kr, zero)))
 
 

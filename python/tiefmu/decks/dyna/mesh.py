@@ -87,7 +87,7 @@ class Collected:
                 row = int(twice[0] - (ends[number - 1] if number else 0))
                 block.fail(f"element {parts[0][twice[0]]} is repeated", int(cards[row]))
             side = np.concatenate(self.sides[kind]) if kind in self.sides else None
-            self.deck.elements[kind] = Elements(kind, *parts, side)
+            self.deck.elements[kind] = Elements(kind, *parts, second_axis=side)
 
 
 def known(deck: Deck, block: Block, cards, ids, part, nodes, optional: int) -> np.ndarray:
