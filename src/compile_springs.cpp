@@ -78,13 +78,13 @@ void Compilation::placeSprings() {
       if (!(spring.length > 0))
         throw SceneError(where + "nodes " + id(spec.a) + " and " + id(spec.b) +
                          " are at the same place; a beam needs two distinct positions");
+      if (!axesOfBeam(spec, spring))
+        throw SceneError(where + "its orientation is parallel to the line between nodes " + id(spec.a) + " and " +
+                         id(spec.b));
       for (const auto& [node, end] : {std::pair{spec.a, &spring.a}, std::pair{spec.b, &spring.b}}) {
         if (!canTurn(*end)) throw SceneError(where + cannotTurn(node, *end));
         orient(*end);
       }
-      if (!axesOfBeam(spec, spring))
-        throw SceneError(where + "its orientation is parallel to the line between nodes " + id(spec.a) + " and " +
-                         id(spec.b));
     } else {
       const bool torsion = !spec.rotationalStiffness.isZero(0) || !spec.rotationalDamping.isZero(0);
       for (const auto& [node, end] : {std::pair{spec.a, &spring.a}, std::pair{spec.b, &spring.b}})

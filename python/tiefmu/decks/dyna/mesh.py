@@ -77,17 +77,17 @@ class Collected:
 
     def finish(self):
         for kind, groups in self.groups.items():
-            parts = [np.concatenate([group[i] for group in groups]) for i in range(4)]
-            order = np.argsort(parts[0], kind="stable")
-            twice = order[1:][parts[0][order][1:] == parts[0][order][:-1]]
+            ids, nodes, part, thickness = (np.concatenate([group[i] for group in groups]) for i in range(4))
+            order = np.argsort(ids, kind="stable")
+            twice = order[1:][ids[order][1:] == ids[order][:-1]]
             if len(twice):
                 ends = np.cumsum([len(group[0]) for group in groups])
                 number = int(np.searchsorted(ends, twice[0], side="right"))
                 *_, block, cards = groups[number]
                 row = int(twice[0] - (ends[number - 1] if number else 0))
-                block.fail(f"element {parts[0][twice[0]]} is repeated", int(cards[row]))
+                block.fail(f"element {ids[twice[0]]} is repeated", int(cards[row]))
             side = np.concatenate(self.sides[kind]) if kind in self.sides else None
-            self.deck.elements[kind] = Elements(kind, *parts, second_axis=side)
+            self.deck.elements[kind] = Elements(kind, ids, nodes, part, thickness, side)
 
 
 def known(deck: Deck, block: Block, cards, ids, part, nodes, optional: int) -> np.ndarray:

@@ -83,13 +83,13 @@ def read_elements(deck: Deck, blocks: list[Block]):
             corners = corners[:, :2]
         found.setdefault(kind, []).append((ids, corners, np.full(len(ids), part), thickness, block))
     for kind, groups in found.items():
-        parts = [np.concatenate([group[i] for group in groups]) for i in range(4)]
-        order = np.argsort(parts[0], kind="stable")
-        twice = order[1:][parts[0][order][1:] == parts[0][order][:-1]]
+        ids, nodes, of_part, thickness = (np.concatenate([group[i] for group in groups]) for i in range(4))
+        order = np.argsort(ids, kind="stable")
+        twice = order[1:][ids[order][1:] == ids[order][:-1]]
         if len(twice):
             ends = np.cumsum([len(group[0]) for group in groups])
             block = groups[int(np.searchsorted(ends, twice[0], side="right"))][4]
-            block.fail(f"element {parts[0][twice[0]]} is repeated")
+            block.fail(f"element {ids[twice[0]]} is repeated")
         deck.elements[kind] = Elements(kind, *parts, second_axis=np.concatenate(sides) if kind == "beam" else None)
 
 
