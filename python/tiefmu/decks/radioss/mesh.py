@@ -90,7 +90,8 @@ def read_elements(deck: Deck, blocks: list[Block]):
             ends = np.cumsum([len(group[0]) for group in groups])
             block = groups[int(np.searchsorted(ends, twice[0], side="right"))][4]
             block.fail(f"element {ids[twice[0]]} is repeated")
-        deck.elements[kind] = Elements(kind, *parts, second_axis=np.concatenate(sides) if kind == "beam" else None)
+        side = np.concatenate(sides) if kind == "beam" else None
+        deck.elements[kind] = Elements(kind, ids, nodes, of_part, thickness, side)
 
 
 def read_parts(deck: Deck, blocks: list[Block]) -> dict[int, int]:
