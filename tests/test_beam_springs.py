@@ -34,7 +34,7 @@ def axes(ends=ENDS, side=SIDE):
 
 def textbook(e, g, area, iy, iz, j, length, shear_area):
     """12 x 12 stiffness of the Timoshenko beam from node 1 at x = 0 to node 2 at x = length, freedoms u, v, w and
-    rotations about x, y, z: J. S. Przemieniecki, Theory of Matrix Structural Analysis, 1968, section 5.6."""
+    rotations about x, y, z."""
     k = np.zeros((12, 12))
     axial, twist = np.array([[1, -1], [-1, 1]]) * e * area / length, np.array([[1, -1], [-1, 1]]) * g * j / length
     k[np.ix_([0, 6], [0, 6])], k[np.ix_([3, 9], [3, 9])] = axial, twist
