@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 from dyna_cards import DynaDeck
 from tiefmu import decks
-from tiefmu.decks import dyna
-from tiefmu.decks.dyna import keywords, parameters, ties
+from tiefmu.decks import dyna, parameters
+from tiefmu.decks.dyna import keywords, ties
 from tiefmu.decks.element_properties import nodal
 
 PLATE = {1: (0, 0, 0), 2: (2, 0, 0), 3: (2, 1, 0), 4: (0, 1, 0)}
