@@ -183,6 +183,19 @@ def test_springs_elsewhere_are_the_hosts(tmp_path):
     assert read(made, tmp_path, free=("part 1",)).scene.tables["spring"][0]["nodes"] == [1, 12]
 
 
+def test_rigid_body_of_masters_that_hold_no_slave(tmp_path):
+    """A clamp on the part whose surface is tied elsewhere: it is no port, and the FMU is built all the same."""
+    far = {21: (2, 0, 3), 22: (3, 0, 3), 23: (3, 1, 3), 24: (2, 1, 3)}
+    made = (
+        deck().nodes(far).elements("SHELL", 1, {2: tuple(far)}).node_group(8, [21, 22], "clamp").node_group(9, [1, 2])
+    )
+    made.block("/RBODY/3", (0, 0, 0, 0, 0.0, 8), title="clamp").block("/RBODY/4", (0, 0, 0, 0, 0.0, 9), title="frame")
+    found = read(made, tmp_path)
+    assert [port["name"] for port in found.scene.tables["interface"]["ports"]] == ["frame"]
+    assert any("1 rigid bodies, the first is 'clamp': no ports" in line for line in found.deck.notes)
+    assert len(decks.compiled(found).model.report()["ports"]) == 1
+
+
 # masses, start, gravity
 
 

@@ -66,9 +66,23 @@ def read(path: Path, ties: list[str] | None = None, free: tuple[str, ...] = ()) 
     deck = reader.read(path, str(path), ties)
     untangle(deck)
     found = Imported(deck, to_scene.convert(deck, free))
+    bodies = found.scene.tables.pop("interface", None)
     if found.scene.pairwise:
         settle(deck, found.scene, compiled(found))
+    if bodies:
+        keep_ports(found, bodies["ports"])
     return found
+
+
+def keep_ports(found: Imported, ports: list[dict]):
+    """Ports of rigid bodies that hold a node of the model; others lie on the ties' surfaces where nothing is tied."""
+    nodes = compiled(found).model.report()["nodes"]["id"]
+    kept = [port for port in ports if np.isin(found.scene.node_sets[port["nodes"]], nodes).any()]
+    lone = [port["name"] for port in ports if port not in kept]
+    if lone:
+        found.deck.notes.append(f"no tie holds a node of {len(lone)} rigid bodies, the first is '{lone[0]}': no ports")
+    if kept:
+        found.scene.tables["interface"] = {"ports": kept}
 
 
 def untangle(deck: Deck):
