@@ -11,7 +11,11 @@
 # make fuzz   60 s of fuzzing of resources, serialised states and scene files
 # make binaries  build the FMU's library for Linux (glibc 2.17 or later) and Windows, for every FMU built afterwards;
 #             make binaries PLATFORMS="aarch64-linux ..." builds others. About ten minutes each.
-# make test-linux, test-windows, test-arm  run what `make binaries` built, the latter two under wine and qemu-user
+# make test-linux, test-debian11, test-windows, test-arm, test-macos  what `make binaries` built: run here, with the
+#             C library of Debian 11, under wine, under qemu-user; of macOS only what the file says of itself
+# make wheels  wheels for Linux (x86-64, Arm) and Windows, each with the FMU's library for every system, to dist/; for
+#             Python 3.10, 3.11, and 3.12 and later, as far as PYTHONS="python3.10 ..." are there
+# make test-wheels  install those for this machine in fresh environments and run the demo
 # make bench  time the kernels, the FMU calls and what grows with a scene, write bench/latest.csv and docs/bench.svg
 # Bench counts instructions too.
 PYTHON ?= python3
@@ -23,7 +27,7 @@ SOURCES := CMakeLists.txt $(wildcard src/*.?pp modelDescription/*.?pp fmu/*.?pp 
 # Each set in an environment of its own; not compiled ahead, as most of their files are never imported.
 TOOLS := build/tools/importers/installed build/tools/cofmupy/installed
 
-.PHONY: demo test binaries test-linux test-windows test-arm instructions lint format tools study sanitize projections fuzz bench valgrind browser chromium clean
+.PHONY: demo test binaries wheels test-linux test-debian11 test-windows test-arm test-macos test-wheels instructions lint format tools study sanitize projections fuzz bench valgrind browser chromium clean
 demo: $(VENV)/installed
 	$(BIN)/tiefmu demo --out out
 	$(BIN)/tiefmu accept examples/acceptance/weld.toml examples/acceptance/criteria.toml --pictures out/acceptance
@@ -105,16 +109,44 @@ build/zig/installed: cmake/requirements.txt
 	$(BIN)/python -m pip install --quiet --no-compile --no-deps --upgrade --target build/zig/wheel -r $<
 	touch $@
 
-# What `make binaries` built, where it is meant to run. Debian: wine; qemu-user and libc6-arm64-cross.
-test-linux: binaries
-	$(BIN)/python -m pytest -m elsewhere -k linux64 tests/test_elsewhere.py
+# What `make binaries` built, where it is meant to run. Debian: wine; qemu-user and libc6-arm64-cross; debootstrap.
+ELSEWHERE = $(BIN)/python -m pytest -m elsewhere tests/test_elsewhere.py -k
+test-linux: binaries $(VENV)/elsewhere
+	$(ELSEWHERE) linux64
 
-test-windows: binaries
-	$(BIN)/python -m pytest -m elsewhere -k win64 tests/test_elsewhere.py
+test-debian11: binaries $(VENV)/elsewhere build/debian11
+	$(ELSEWHERE) debian11
+
+test-windows: binaries $(VENV)/elsewhere
+	$(ELSEWHERE) win64
 
 test-arm: PLATFORMS := aarch64-linux
-test-arm: binaries
-	$(BIN)/python -m pytest -m elsewhere -k aarch64-linux tests/test_elsewhere.py
+test-arm: binaries $(VENV)/elsewhere
+	$(ELSEWHERE) aarch64-linux
+
+test-macos: PLATFORMS := darwin64
+test-macos: binaries $(VENV)/elsewhere
+	$(ELSEWHERE) darwin
+
+build/debian11:
+	rm -rf $@.part
+	debootstrap --variant=minbase bullseye $@.part
+	mv $@.part $@
+
+PYTHONS ?= python3.10 python3.11 python3.12
+wheels: PLATFORMS := linux64 win64 aarch64-linux darwin64
+wheels: binaries $(VENV)/elsewhere
+	PATH=$(abspath $(BIN)):$$PATH $(BIN)/python cmake/build_wheels.py build/zig/wheel/ziglang $(PYTHONS)
+
+test-wheels: wheels
+	$(BIN)/python -m pytest -m elsewhere tests/test_wheels.py
+
+# scikit-build-core runs in each of PYTHONS, from .venv; Python 3.10 lacks what it takes from the standard library later.
+$(VENV)/elsewhere: $(VENV)/tested-with
+	$(BIN)/python -m pip install --quiet --group elsewhere
+	$(BIN)/python -m pip install --quiet --no-deps --upgrade --target build/wheels/backports --python-version 3.10 \
+	  --platform any --only-binary :all: tomli exceptiongroup typing_extensions
+	touch $@
 
 tools: $(TOOLS)
 

@@ -8,13 +8,14 @@ sources stays.
 
 import os
 import shutil
+import struct
 import subprocess
 import sys
 import time
 from pathlib import Path
 
 from tiefmu.binaries import BUILT, CHECKOUT, is_stale, source_hash
-from tiefmu.platforms import BY_FOLDER, library_of
+from tiefmu.platforms import BY_FOLDER, Platform, library_of
 
 # What each library holds of the compiler's own parts.
 LICENSES = {"libcxx.txt": "lib/libcxx/LICENSE.TXT", "libunwind.txt": "lib/libunwind/LICENSE.TXT"}
@@ -31,37 +32,53 @@ def main(zig: Path, names: list[str]) -> int:
         return fail(f"{compiler}: no such file; the package ziglang brings it")
     for name in names:
         if not is_stale(name):
-            print(f"{name}: as it is in {BUILT / name}")
-        elif status := build(name, zig, compiler):
+            print(f"{name}: as it is in {BUILT / BY_FOLDER[name].kept}")
+        elif status := build(BY_FOLDER[name], zig, compiler):
             return status
     return 0
 
 
-def build(name: str, zig: Path, compiler: Path) -> int:
-    platform, began = BY_FOLDER[name], time.perf_counter()
-    folder = CHECKOUT / "build" / "zig" / name
-    setting_up = ["cmake", "-S", CHECKOUT, "-B", folder, "-G", "Ninja"]
-    setting_up += [f"-DCMAKE_TOOLCHAIN_FILE={CHECKOUT / 'cmake' / 'zig.cmake'}", f"-DTIEFMU_ZIG={compiler}"]
-    setting_up += [f"-DTIEFMU_TARGET={platform.target}", "-DTIEFMU_PYTHON=OFF", "-DCMAKE_BUILD_TYPE=Release"]
-    setting_up += [f"-DPython_EXECUTABLE={sys.executable}"]
-    for command in (
-        setting_up,
-        ["cmake", "--build", folder, "--target", "tiefmu_fmu", "-j", os.environ.get("JOBS", "2")],
-    ):
-        if (status := subprocess.run(list(map(str, command))).returncode) != 0:
-            return fail(f"{name}: cmake ended with status {status}")
-    library = folder / f"tiefmu{platform.suffix}"
-    system, machines = library_of(library.read_bytes())
-    assert system == platform.system and platform.machine in machines, f"{library}: for {system}, {machines}"
-    target = BUILT / name
+def build(platform: Platform, zig: Path, compiler: Path) -> int:
+    began, made_from = time.perf_counter(), source_hash()
+    libraries = []
+    for target in platform.targets:
+        folder = CHECKOUT / "build" / "zig" / target
+        for command in commands(target, folder, compiler):
+            if (status := subprocess.run(list(map(str, command))).returncode) != 0:
+                return fail(f"{target}: cmake ended with status {status}")
+        libraries.append((folder / f"tiefmu{platform.suffix}").read_bytes())
+    data = libraries[0] if len(libraries) == 1 else universal(libraries)
+    system, machines = library_of(data)
+    assert system == platform.system and platform.machine in machines, f"a library for {system}, {machines}"
+    target = BUILT / platform.kept
     shutil.rmtree(target, ignore_errors=True)
     (target / "licenses").mkdir(parents=True)
-    shutil.copy(library, target)
+    (target / f"tiefmu{platform.suffix}").write_bytes(data)
     for file, source in (LICENSES | (WINDOWS_LICENSES if system == "windows" else {})).items():
         shutil.copyfile(zig / source, target / "licenses" / file)
-    (target / "made-from").write_text(source_hash() + "\n")  # last: it says that all is there
-    print(f"{name}: {library.stat().st_size / 1e6:.2f} MB in {time.perf_counter() - began:.0f} s, in {target}")
+    (target / "made-from").write_text(made_from + "\n")  # last: it says that all is there
+    print(f"{platform.kept}: {len(data) / 1e6:.2f} MB in {time.perf_counter() - began:.0f} s, in {target}", flush=True)
     return 0
+
+
+def commands(target: str, folder: Path, compiler: Path) -> list[list]:
+    setting_up = ["cmake", "-S", CHECKOUT, "-B", folder, "-G", "Ninja"]
+    setting_up += [f"-DCMAKE_TOOLCHAIN_FILE={CHECKOUT / 'cmake' / 'zig.cmake'}", f"-DTIEFMU_ZIG={compiler}"]
+    setting_up += [f"-DTIEFMU_TARGET={target}", "-DTIEFMU_PYTHON=OFF", "-DCMAKE_BUILD_TYPE=Release"]
+    setting_up += [f"-DPython_EXECUTABLE={sys.executable}"]
+    return [setting_up, ["cmake", "--build", folder, "--target", "tiefmu_fmu", "-j", os.environ.get("JOBS", "2")]]
+
+
+def universal(libraries: list[bytes]) -> bytes:
+    """One file of macOS libraries for several processors, each from a multiple of the largest page of them."""
+    page = 2**14
+    head, body = struct.pack(">II", 0xCAFEBABE, len(libraries)), b""
+    for data in libraries:
+        body += bytes(-len(body) % page)
+        kind = struct.unpack_from("<II", data, 4)
+        head += struct.pack(">IIIII", *kind, page + len(body), len(data), page.bit_length() - 1)
+        body += data
+    return head.ljust(page, b"\0") + body
 
 
 def fail(message: str) -> int:

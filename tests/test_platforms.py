@@ -90,6 +90,18 @@ def test_libraries_of_other_systems_are_told_apart():
             library_of(whole[:-1])
 
 
+def test_libraries_for_both_processors_of_macos_become_one_file(monkeypatch):
+    monkeypatch.syspath_prepend(str(binaries.CHECKOUT / "cmake"))
+    from build_binaries import universal
+
+    parts = [macos(0x01000007) + b"tail", macos(0x0100000C)]
+    both = universal(parts)
+    assert library_of(both) == ("darwin", {"x86_64", "aarch64"})
+    for k, part in enumerate(parts):
+        _, _, offset, size, power = struct.unpack_from(">IIIII", both, 8 + 20 * k)
+        assert both[offset : offset + size] == part and offset % 2**power == 0 and 2**power == 16384
+
+
 def test_the_floor_of_glibc_is_that_of_the_symbol_table():
     if here().system != "linux":
         pytest.skip("of Linux only")
@@ -165,6 +177,27 @@ def test_a_library_made_from_other_sources_is_left_out(weld, built, scene_file, 
     assert capsys.readouterr().err == (
         f"error: platform 'win64': {binaries.BUILT / 'win64'} was made from other sources; run `make binaries` again\n"
     )
+
+
+def test_a_wheel_brings_the_libraries_of_all_systems(weld, built, tmp_path, monkeypatch, scene_file, capsys):
+    """Beside its module; what lies in a checkout does not count."""
+    both = b"\xca\xfe\xba\xbe" + struct.pack(">I", 2)
+    both += struct.pack(">IIIII", 0x01000007, 3, 48, 4, 2) + struct.pack(">IIIII", 0x0100000C, 0, 52, 4, 2) + bytes(8)
+    for folder, data in {"linux64": OWN.data, "win64": windows(), "darwin64": both}.items():
+        built(folder, data, made_from="0" * 64)
+    monkeypatch.setattr(binaries, "INSTALLED", binaries.BUILT)
+    monkeypatch.setattr(binaries, "BUILT", tmp_path / "nowhere")
+    assert main(["build", scene_file(weld)]) == 0
+    said = capsys.readouterr()
+    assert ", for linux64 (" in said.out and said.out.rstrip().endswith(", win64") and "warning: lib" not in said.err
+    assert main(["build", "weld.toml", "--platforms", "darwin64,aarch64-darwin"]) == 0
+    with zipfile.ZipFile("weld.fmu") as archive:
+        for folder in ("darwin64", "aarch64-darwin"):
+            assert archive.read(f"binaries/{folder}/weld.dylib") == both
+    (binaries.INSTALLED / "win64" / "tiefmu.dll").write_bytes(windows()[:-1])
+    capsys.readouterr()
+    assert main(["build", "weld.toml"]) == 2
+    assert capsys.readouterr().err.endswith("tiefmu.dll: is cut short: 1023 of 1024 bytes; install tiefmu again\n")
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,5 @@
-"""The FMU's libraries that there are: that of this system, and those that `make binaries` built for others."""
+"""The FMU's libraries that there are: in a wheel those of all systems, in a checkout that of this one and those that
+`make binaries` built."""
 
 import hashlib
 from dataclasses import dataclass
@@ -8,11 +9,19 @@ from . import _core
 from .errors import UsageError
 from .platforms import BY_FOLDER, LibraryError, Platform, glibc_floor, here, library_of
 
-INSTALLED = Path(_core.__file__).parent / "binaries"
+INSTALLED = Path(_core.__file__).parent / "binaries"  # tiefmu.SUFFIX; in a wheel instead what BUILT holds
 CHECKOUT = Path(__file__).parents[2]
 BUILT = CHECKOUT / "build" / "binaries"  # FOLDER/tiefmu.SUFFIX, FOLDER/made-from, licenses/*.txt
 USUAL = ("linux64", "win64")  # what an FMU carries if nothing else is asked for
-SOURCES = ("CMakeLists.txt", "cmake/*", "src/*", "modelDescription/*", "fmu/*", "pyproject.toml")
+SOURCES = (
+    "CMakeLists.txt",
+    "cmake/zig.cmake",
+    "cmake/requirements.txt",
+    "src/*",
+    "modelDescription/*",
+    "fmu/*",
+    "pyproject.toml",
+)
 
 
 @dataclass(frozen=True)
@@ -55,35 +64,50 @@ def libraries(wanted: list[str] | None = None) -> list[Library]:
     return found
 
 
+def folder_of(name: str) -> Path:
+    """Where the library for a platform is, if there is one."""
+    kept = BY_FOLDER[name].kept
+    return INSTALLED / kept if (INSTALLED / kept).is_dir() else BUILT / kept
+
+
 def built(name: str) -> Library | None:
-    """One that `make binaries` has made from the sources as they are."""
-    if name not in BY_FOLDER or not (BUILT / name).is_dir() or is_stale(name):
+    """One that came with the wheel, or that `make binaries` has made from the sources as they are."""
+    if name not in BY_FOLDER or not folder_of(name).is_dir() or is_stale(name):
         return None
-    platform = BY_FOLDER[name]
-    path = BUILT / name / f"tiefmu{platform.suffix}"
+    platform, folder = BY_FOLDER[name], folder_of(name)
+    path = folder / f"tiefmu{platform.suffix}"
     try:
         data = path.read_bytes()
         system, machines = library_of(data)
     except (OSError, LibraryError) as error:
-        raise UsageError(f"{path}: {getattr(error, 'strerror', None) or error}; run `make binaries` again") from None
+        raise UsageError(f"{path}: {getattr(error, 'strerror', None) or error}; {again(folder)}") from None
     if system != platform.system or platform.machine not in machines:
-        raise UsageError(f"{path}: is a library for {system}, {', '.join(machines)}; run `make binaries` again")
-    return Library(platform, data, {file.name: file.read_bytes() for file in (BUILT / name / "licenses").glob("*.txt")})
+        raise UsageError(f"{path}: is a library for {system}, {', '.join(sorted(machines))}; {again(folder)}")
+    return Library(platform, data, {file.name: file.read_bytes() for file in (folder / "licenses").glob("*.txt")})
+
+
+def again(folder: Path) -> str:
+    return "install tiefmu again" if folder.parent == INSTALLED else "run `make binaries` again"
 
 
 def is_stale(name: str) -> bool:
-    made_from = BUILT / name / "made-from"
+    """Whether one that `make binaries` built is missing or made from other sources."""
+    folder = folder_of(name)
+    if folder.parent == INSTALLED:
+        return False
+    made_from = folder / "made-from"
     return not made_from.is_file() or made_from.read_text().strip() != source_hash()
 
 
 def stale() -> list[str]:
     """Platforms whose libraries are there, but made from other sources than those of this checkout."""
-    return [name for name in BY_FOLDER if (BUILT / name).is_dir() and is_stale(name)]
+    return [name for name in BY_FOLDER if folder_of(name).is_dir() and is_stale(name)]
 
 
 def missing(name: str) -> str:
-    if (BUILT / name).is_dir():
-        return f"{BUILT / name} was made from other sources; run `make binaries` again"
+    folder = folder_of(name)
+    if folder.is_dir():
+        return f"{folder} was made from other sources; run `make binaries` again"
     return f"there is no library for it; `make binaries PLATFORMS={name}` builds it"
 
 

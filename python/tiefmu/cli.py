@@ -1,6 +1,7 @@
 """The command line: build, info, run, accept, report, sweep, demo, import, study, advise."""
 
 import argparse
+import io
 import json
 import os
 import sys
@@ -30,6 +31,8 @@ SHOWN = 20  # outputs that `run` prints
 
 def main(arguments: list[str] | None = None) -> int:
     """Runs a command; returns the exit status: 0, 1 (a check or a criterion failed), 2 (bad input), 130 (Ctrl-C)."""
+    if isinstance(sys.stdout, io.TextIOWrapper):  # of another encoding, as files on Windows: ? for what it lacks
+        sys.stdout.reconfigure(errors="replace")
     options = parser().parse_args(arguments)
     try:
         status = options.command(options) or 0
@@ -81,8 +84,8 @@ def parser() -> argparse.ArgumentParser:
         "--platforms",
         metavar="NAMES",
         type=lambda text: [name.strip() for name in text.split(",")],
-        help=f"systems that the FMU is for, of {', '.join(BY_FOLDER)} (default: this one; also linux64 and win64 where "
-        "`make binaries` has built them)",
+        help=f"systems that the FMU is for, of {', '.join(BY_FOLDER)} (default: this one, linux64 and win64, "
+        "in a checkout as far as `make binaries` has built them)",
     )
     build.set_defaults(command=run_build)
 
@@ -140,7 +143,7 @@ def parser() -> argparse.ArgumentParser:
         epilog="example: tiefmu demo --out out",
     )
     demo.add_argument("--out", metavar="DIR", type=Path, default=Path("out"), help="folder to write to (default: out)")
-    demo.add_argument("--scenes", metavar="DIR", type=Path, help="folder of the scenes (default: of the checkout)")
+    demo.add_argument("--scenes", metavar="DIR", type=Path, help="folder of the scenes (default: the examples)")
     demo.set_defaults(command=run_demo)
 
     accept_command.add_parser(commands)

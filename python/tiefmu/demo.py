@@ -17,7 +17,8 @@ from .report import report
 from .results import Result
 from .run import run
 
-SCENES = Path(__file__).resolve().parents[2] / "scenes"  # of the checkout
+PACKED = Path(__file__).resolve().parent / "scenes"  # in a wheel
+SCENES = PACKED if PACKED.is_dir() else Path(__file__).resolve().parents[2] / "scenes"  # of the checkout
 
 
 @dataclass

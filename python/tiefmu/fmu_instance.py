@@ -42,7 +42,8 @@ class Fmu:
     def __enter__(self) -> "Fmu":
         import fmpy
 
-        self._folder = tempfile.TemporaryDirectory(prefix="tiefmu-")
+        # Windows keeps the file of a library that is still loaded.
+        self._folder = tempfile.TemporaryDirectory(prefix="tiefmu-", ignore_cleanup_errors=True)
         try:
             fmpy.extract(str(self.path), self._folder.name)
         except Exception as error:

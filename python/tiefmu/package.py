@@ -22,9 +22,9 @@ def build(scene: Scene, path, extra: dict[str, bytes] | None = None, platforms: 
     """Writes the FMU to `path` and returns it. Nothing is left behind when it fails. extra: further files, path in the
     archive -> bytes.
 
-    platforms: folders below binaries/, e.g. ["linux64", "win64"]; by default that of this system, and linux64 and win64
-    where `make binaries` has built them. Raises UsageError where the file cannot be written, and for a platform that
-    there is no library for.
+    platforms: folders below binaries/, e.g. ["linux64", "win64"]; by default that of this system, linux64 and win64, in
+    a checkout as far as `make binaries` has built them. Raises UsageError where the file cannot be written, and for a
+    platform that there is no library for.
     """
     path = Path(path)
     check_folder_of(path)

@@ -10,21 +10,24 @@ from dataclasses import dataclass
 @dataclass(frozen=True)
 class Platform:
     """folder: below binaries/ (FMI 2.0.4, section 2.3: Linux and Windows on x86-64 have names of their own, `darwin64`
-    is macOS on x86-64, all others are named by the platform tuples of FMI 3.0). target: zig's name of the system."""
+    is macOS on x86-64, all others are named by the platform tuples of FMI 3.0). targets: zig's names of the system; of
+    several, for one file that holds the library for each. kept: where that file is kept, folder of build/binaries."""
 
     folder: str
     suffix: str
     system: str
     machine: str
-    target: str
+    targets: tuple[str, ...]
+    kept: str
 
 
+MACOS = ("x86_64-macos.11.0", "aarch64-macos.11.0")
 PLATFORMS = (
-    Platform("linux64", ".so", "linux", "x86_64", "x86_64-linux-gnu.2.17"),
-    Platform("win64", ".dll", "windows", "x86_64", "x86_64-windows-gnu"),
-    Platform("aarch64-linux", ".so", "linux", "aarch64", "aarch64-linux-gnu.2.17"),
-    Platform("darwin64", ".dylib", "darwin", "x86_64", "x86_64-macos.11.0"),
-    Platform("aarch64-darwin", ".dylib", "darwin", "aarch64", "aarch64-macos.11.0"),
+    Platform("linux64", ".so", "linux", "x86_64", ("x86_64-linux-gnu.2.17",), "linux64"),
+    Platform("win64", ".dll", "windows", "x86_64", ("x86_64-windows-gnu",), "win64"),
+    Platform("aarch64-linux", ".so", "linux", "aarch64", ("aarch64-linux-gnu.2.17",), "aarch64-linux"),
+    Platform("darwin64", ".dylib", "darwin", "x86_64", MACOS, "darwin64"),
+    Platform("aarch64-darwin", ".dylib", "darwin", "aarch64", MACOS, "darwin64"),
 )
 BY_FOLDER = {each.folder: each for each in PLATFORMS}
 
@@ -37,7 +40,8 @@ def here() -> Platform:
         if (each.system, each.machine) == (system, machine):
             return each
     suffix = {"windows": ".dll", "darwin": ".dylib"}.get(system, ".so")
-    return Platform(f"{machine}-{system}", suffix, system, machine, "")
+    name = f"{machine}-{system}"
+    return Platform(name, suffix, system, machine, (), name)
 
 
 class LibraryError(ValueError):
