@@ -18,7 +18,7 @@ from tiefmu.binaries import BUILT, CHECKOUT, is_stale, source_hash
 from tiefmu.platforms import BY_FOLDER, Platform, library_of
 
 # What each library holds of the compiler's own parts.
-LICENSES = {"libcxx.txt": "lib/libcxx/LICENSE.TXT", "libunwind.txt": "lib/libunwind/LICENSE.TXT"}
+LICENSES = {"zig.txt": "LICENSE", "libcxx.txt": "lib/libcxx/LICENSE.TXT", "libunwind.txt": "lib/libunwind/LICENSE.TXT"}
 WINDOWS_LICENSES = {"mingw-w64.txt": "lib/libc/mingw/COPYING"}
 
 

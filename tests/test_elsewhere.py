@@ -25,10 +25,10 @@ pytestmark = pytest.mark.elsewhere
 
 ROOT = Path(__file__).parents[1]
 SCENES = [path for path in sorted((ROOT / "scenes").iterdir()) if path.suffix in (".toml", ".rad")]
-DEBIAN_11 = ROOT / "build" / "debian11"
+DEBIAN_11 = ROOT / "build" / "debian11" / "lib" / "x86_64-linux-gnu"
 EMULATORS = {
     "linux64": [],
-    "debian11": [DEBIAN_11 / "lib64/ld-linux-x86-64.so.2", "--library-path", DEBIAN_11 / "lib/x86_64-linux-gnu"],
+    "debian11": [DEBIAN_11 / "ld-linux-x86-64.so.2", "--library-path", DEBIAN_11],
     "win64": ["wine"],
     "aarch64-linux": ["qemu-aarch64", "-L", "/usr/aarch64-linux-gnu"],
 }

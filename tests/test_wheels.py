@@ -37,7 +37,8 @@ def test_content(wheel):
             data = archive.read(f"tiefmu/binaries/{platform.kept}/tiefmu{platform.suffix}")
             system, machines = library_of(data)
             assert system == platform.system and platform.machine in machines
-            assert f"tiefmu/binaries/{platform.kept}/licenses/libcxx.txt" in names
+            for part in ("libcxx", "libunwind", "zig"):
+                assert f"tiefmu/binaries/{platform.kept}/licenses/{part}.txt" in names
         assert "tiefmu/binaries/win64/licenses/mingw-w64.txt" in names
         assert {Path(name).stem for name in names if re.fullmatch(r"tiefmu/scenes/\w+\.(toml|rad)", name)} == set(
             SCENES

@@ -15,7 +15,7 @@ BUILT = CHECKOUT / "build" / "binaries"  # FOLDER/tiefmu.SUFFIX, FOLDER/made-fro
 USUAL = ("linux64", "win64")  # what an FMU carries if nothing else is asked for
 SOURCES = (
     "CMakeLists.txt",
-    "cmake/zig.cmake",
+    "cmake/zig*",
     "cmake/requirements.txt",
     "src/*",
     "modelDescription/*",
