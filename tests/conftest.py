@@ -4,8 +4,16 @@ import subprocess
 import sys
 
 import pytest
+from tiefmu import binaries
 
 pytest_plugins = ["fmu_scenes"]  # its fixtures
+
+
+@pytest.fixture(autouse=True, scope="session")
+def only_the_local_compilers_library(request, tmp_path_factory):
+    """Tests do not depend on what `make binaries` has left in the checkout, but for those of just that."""
+    if not any(item.get_closest_marker("elsewhere") for item in request.session.items):
+        binaries.BUILT = tmp_path_factory.mktemp("binaries") / "nowhere"
 
 
 @pytest.fixture
