@@ -236,3 +236,23 @@ def test_the_largest_reaction_of_any_size(scale):
     for time in (0.0, 1.0, 2.0):
         reactions.write(np.array([[time, 0.0, (time % 2) * scale, 0.0]]))
     assert reactions.where == "master[7].f" and reactions.time == (1.0 if scale > 1e-150 else 0.0)
+
+
+@pytest.mark.parametrize("expected", [100, 7])
+@pytest.mark.parametrize("most", [2**29, 8 * 3 * 25])
+def test_rows_of_a_long_run_are_kept_once(expected, most, monkeypatch):
+    """In one array from the start, whose end is cut off without a copy; also where there are more rows than expected.
+    The k-th rows and the last of what does not fit."""
+    monkeypatch.setattr(results, "ONE_BLOCK", 0)
+    monkeypatch.setattr(results, "MOST_KEPT", most)
+    rows = np.random.default_rng(1).normal(size=(100, 3))
+    kept = results.Kept(["a", "b"], {"a": "m", "b": "m"}, expected)
+    for first, last in ((0, 1), (1, 40), (40, 99), (99, 100)):
+        kept.write(rows[first:last].copy())
+    found = kept.result(0.0)
+    every = max(1, int(np.ceil(expected * 24 / most)))
+    wanted = rows[::every] if 99 % every == 0 else np.vstack([rows[::every], rows[-1:]])
+    np.testing.assert_array_equal(found.rows, wanted)
+    assert (found.steps, found.every) == (99, every)
+    np.testing.assert_array_equal([found.low, found.high, found.last], [rows.min(axis=0), rows.max(axis=0), rows[-1]])
+    assert np.shares_memory(found.rows, kept.rows) == (expected == 100)

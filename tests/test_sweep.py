@@ -327,6 +327,10 @@ WRONG = [
         "input 'slave[1].f[2]': no column of the input; did you mean 'slave[1].f[3]'?",
     ),
     (
+        f'{HEAD}[[parameter]]\ninput = "*"\nvalues = [1, 2]',
+        "input '*': there is no input to vary; name one in [run]",
+    ),
+    (
         f'scene = "plate.toml"\nsignals = ["slaves[1].v[3]"]\n{FIRST}values = [1]',
         "signals: 'slaves[1].v[3]': no such output; did you mean 'slave[1].v[3]'?",
     ),

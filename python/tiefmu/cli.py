@@ -1,10 +1,12 @@
 """The command line: build, info, run, accept, report, sweep, demo, import, study, advise."""
 
 import argparse
+import contextlib
 import io
 import json
 import os
 import sys
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from . import __version__, advise, study
@@ -175,19 +177,38 @@ def run_build(options: argparse.Namespace) -> None:
         print(f"{counted(len(found['notes']), 'note')} on the scene: tiefmu info {options.scene}")
 
 
+@contextlib.contextmanager
+def stages(count: int) -> Iterator[Callable[[str], None]]:
+    """A progress bar of so many stages, for what takes seconds; what is yielded begins the one that it names."""
+    from tqdm import tqdm
+
+    form = "{desc} |{bar}| {n_fmt} of {total_fmt}, {elapsed}"
+    with tqdm(total=count, delay=2, disable=None, leave=False, bar_format=form, initial=-1) as bar:
+
+        def begin(name: str) -> None:
+            bar.set_description(name, refresh=False)
+            bar.update()
+
+        yield begin
+
+
 def run_info(options: argparse.Namespace) -> None:
     if options.vtu:
         check_ending(options.vtu, ".vtu")
         check_folder_of(options.vtu)
     elif options.fields:
         raise UsageError("--fields: needs --vtu, the file whose fields they are")
-    found = (
-        of_fmu(existing(options.model))
-        if is_fmu(options.model)
-        else report(load(options.model), positions=bool(options.vtu))
-    )
-    if options.vtu:
-        write_ties(found, options.vtu, options.fields)
+    with stages(3 if options.vtu else 2) as stage:
+        if is_fmu(options.model):
+            found = of_fmu(existing(options.model))
+        else:
+            stage("reading and searching")
+            scene = load(options.model)
+            stage("report")
+            found = report(scene, positions=bool(options.vtu))
+        if options.vtu:
+            stage(f"writing {options.vtu}")
+            write_ties(found, options.vtu, options.fields)
     if options.json:
         json.dump(found, sys.stdout, allow_nan=False)
         print()

@@ -59,10 +59,12 @@ def run_sweep(options: argparse.Namespace) -> int:
                 run_cases(connected, sweep, task, raw, files, left, len(todo), journal)
     finally:
         journal.close()
+        if not journal.rows:
+            journal.path.unlink()
     rows = [journal.rows[case.number] for case in todo]
     parameters = {p.title: [case.values[k] for case in todo] for k, p in enumerate(sweep.parameter)}
     table.write(options.output, parameters, rows)
-    journal.path.unlink()
+    journal.path.unlink(missing_ok=True)
     stopped = sum(bool(row["message"]) for row in rows)
     failed = sum(row.get("passed") is False for row in rows)
     print(

@@ -83,6 +83,8 @@ class Ready:
             if parameter.start and parameter.start not in settable:
                 what = f"start '{parameter.start}': no input or parameter of the FMU"
                 raise UsageError(f"{what}{suggestion(parameter.start, settable)}")
+            if parameter.input and not plan.inputs.names:
+                raise UsageError(f"input '{parameter.input}': there is no input to vary; name one in [run]")
             if parameter.input and parameter.input not in ("*", *plan.inputs.names):
                 what = f"input '{parameter.input}': no column of the input"
                 raise UsageError(f"{what}{suggestion(parameter.input, plan.inputs.names)}")
