@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import tiefmu
 from deck_checks import by_node
 from dyna_cards import DynaDeck
 from tiefmu import decks
@@ -225,6 +226,18 @@ def test_added_masses(tmp_path):
     assert [found[i]["m"] for i in range(1, 5)] == pytest.approx([own + 1.5, own + 1.5, own + 7.5, own + 9])
     assert found[3]["j"] - found[1]["j"] == pytest.approx(2.0)
     assert any("the mean of its moments of inertia, 2, is taken" in line for line in deck.warnings)
+
+
+def test_final_mass(tmp_path):
+    """A shell of 8000 * 2 * 1e-3 = 16 kg brought to 20 kg; less than its own is refused."""
+    made = base(thickness=1e-3).elements("SHELL", 1, {1: (1, 2, 3, 4)})
+    made.block("ELEMENT_MASS_PART", ("IRR", 1, 0.0, 20.0))
+    found, _ = read(made, tmp_path, SQUARE)
+    assert [found[i]["m"] for i in range(1, 5)] == pytest.approx([5.0] * 4)
+    made = base(thickness=1e-3).elements("SHELL", 1, {1: (1, 2, 3, 4)})
+    made.block("ELEMENT_MASS_PART", ("IRR", 1, 0.0, 15.0))
+    with pytest.raises(tiefmu.SceneError, match="its FINMASS 15 is not more than the mass of its elements, 16"):
+        read(made, tmp_path, SQUARE)
 
 
 def test_total_mass(tmp_path):

@@ -3,6 +3,7 @@
 import numpy as np
 
 from ..element_lengths import hex_volume, shell_area, tetra_length
+from ..element_properties import structural_mass
 from ..model import SHELLS, Deck, Fixed, Initial, RigidBody
 from ..selected import Selected
 from .cards import Block
@@ -204,18 +205,24 @@ def mass(deck: Deck, sets: Sets, block: Block):
 
 
 def mass_of_parts(deck: Deck, sets: Sets, block: Block):
-    """*ELEMENT_MASS_PART and _SET: ADDMASS, spread over the part by area of shells and volume of solids."""
+    """*ELEMENT_MASS_PART and _SET: ADDMASS or up to FINMASS, spread by area of shells and volume of solids."""
     for card in range(block.end):
         number, added, whole = block.read(card, "IRR")
         if not number:
             continue
-        if whole:
-            deck.warn(f"{block.at(card)}: its final mass FINMASS {whole:g} is not reached; give the mass that is added")
         if added < 0:
             block.fail(f"its mass {added:g} is negative", card)
         parts = (
             sets.parts(block.id("set", number), block) if block.has("SET") else sets.parts_known([number], block, card)
         )
+        added *= block.origin.unit(mass=1)
+        if whole:
+            own, whole = structural_mass(deck, set(parts)).sum(), whole * block.origin.unit(mass=1)
+            if added:
+                block.fail("it has both ADDMASS and FINMASS; leave one", card)
+            if whole <= own:
+                block.fail(f"its FINMASS {whole:g} is not more than the mass of its elements, {own:g}", card)
+            added = whole - own
         share = np.zeros(len(deck.node_id))
         for kind, one in deck.elements.items():
             nodes = one.nodes[np.isin(one.part, sorted(parts))]
@@ -226,7 +233,7 @@ def mass_of_parts(deck: Deck, sets: Sets, block: Block):
             )
         if share.sum() > 0:
             nodes = np.flatnonzero(share)
-            deck.added_mass.append((nodes, added * block.origin.unit(mass=1) * share[nodes] / share.sum()))
+            deck.added_mass.append((nodes, added * share[nodes] / share.sum()))
 
 
 def element_sizes(deck: Deck, kind: str, nodes: np.ndarray) -> np.ndarray:
