@@ -4,7 +4,8 @@
 //   tiefmu_bench kernels CASE N [shuffled] [THREADS]   cycles at N slaves: loads to masters, accelerations, velocities,
 //                                  slave motion. CASE: default, default-rotations or optimized, then in this order
 //                                  -welds1, -welds4 (quads apart from each other with so many slaves; else a surface
-//                                  of quads with four each), -light (slaves a quarter as heavy), -consistent
+//                                  of quads with four each), -light (slaves a quarter as heavy), -flipped (the loads
+//                                  on the masters change sign before every step), -consistent
 //   tiefmu_bench cycles CASE N COUNT   that many cycles and no timing, for instruction counts
 //   tiefmu_bench memory CASE N     bytes per slave of an FMU's simulation, its model included
 //   tiefmu_bench search N [shuffled]   both searches of N slaves on N/4 segments
@@ -45,7 +46,7 @@ double triad() {
 // What is computed: a formulation ("default", "default-rotations", "optimized"), with lumped or consistent inertia.
 struct Case {
   std::string name, coupling;
-  bool consistent, light;
+  bool consistent, flipped, light;
   int welds = 0;  // slaves of each quad that stands apart; 0: a surface
   bool take(const char* ending) {
     if (!coupling.ends_with(ending)) return false;
@@ -54,6 +55,7 @@ struct Case {
   }
   explicit Case(const std::string& text) : name(text), coupling(text) {
     consistent = take("-consistent");
+    flipped = take("-flipped");
     light = take("-light");
     welds = take("-welds1") ? 1 : take("-welds4") ? 4 : 0;
     if (coupling == "default" || coupling == "default-rotations" || coupling == "optimized") return;
@@ -141,36 +143,37 @@ double bytesMoved(const Case& what) {
   return slave + master / 4;
 }
 
-// One simulation under its own loads, ready to cycle. With consistent inertia those on the masters change in every
-// cycle: an iteration that starts from the solution would have nothing to do.
+// One simulation under its own loads, ready to cycle. Flipped loads are inputs that change before every step, which
+// then evaluates twice.
 class Cycle {
  public:
   Cycle(const Case& what, int slaves, bool shuffled, int threads)
       : simulation_(std::make_shared<Model>(compile(surface(what, slaves, shuffled, threads)))) {
-    if (what.consistent) changing_ = simulation_.layout()[Field::nodeForce].count;
-    load();
+    const std::size_t slaveForces = simulation_.layout()[Field::slaveForce].count;
+    const std::size_t nodeForces = simulation_.layout()[Field::nodeForce].count;
+    for (std::size_t k = 0; k < slaveForces; ++k)
+      simulation_.field(Field::slaveForce)[k] = 1e-3 * static_cast<double>(k % 7);
+    for (std::size_t k = 0; k < nodeForces; ++k)
+      simulation_.field(Field::nodeForce)[k] = 1e-4 * static_cast<double>(k % 5);
+    if (what.flipped) flipped_ = nodeForces;
     simulation_.initialise(0);
   }
   int slaves() const { return simulation_.model().slaves(); }
   void operator()() {
-    for (std::size_t k = 0; k < changing_; ++k) {
-      double& force = simulation_.field(Field::nodeForce)[k];
-      force = -force;
+    if (flipped_ > 0) {
+      double* force = simulation_.field(Field::nodeForce);
+      for (std::size_t k = 0; k < flipped_; ++k) force[k] = -force[k];
+      simulation_.inputsChanged();
     }
     simulation_.step(1e-6);
     simulation_.updateOutputs();
   }
 
  private:
-  void load() {
-    const std::size_t count = simulation_.layout()[Field::slaveForce].count;
-    for (std::size_t k = 0; k < count; ++k) simulation_.field(Field::slaveForce)[k] = 1e-3 * static_cast<double>(k % 7);
-    for (std::size_t k = 0; k < changing_; ++k)
-      simulation_.field(Field::nodeForce)[k] = 1e-4 * static_cast<double>(k % 5);
-  }
   Simulation simulation_;
-  std::size_t changing_ = 0;
+  std::size_t flipped_ = 0;
 };
+
 void kernels(const Case& what, int slaves, bool shuffled, int threads) {
   const double gbs = triad();
   Cycle cycle(what, slaves, shuffled, threads);

@@ -23,8 +23,10 @@ LATEST, REFERENCE, CHART = HERE / "latest.csv", HERE / "instructions.csv", ROOT 
 COLUMNS = ["case", "n", "threads", "value", "unit", "bytes", "triad_gb_s"]
 FORMULATIONS = ["default", "default-rotations", "optimized"]
 CONSISTENT = [f"{name}-consistent" for name in FORMULATIONS]
-# Quads apart from each other, with one and with four slaves, and a surface whose slaves are a quarter as heavy.
-OTHERS = [f"{name}-{kind}" for kind in ("welds1", "welds4", "light") for name in FORMULATIONS]
+# Quads apart from each other, with one and with four slaves.
+WELDS = [f"{name}-{kind}" for kind in ("welds1", "welds4") for name in FORMULATIONS]
+# Surfaces whose loads change sign before every step; slaves of a quad a node's mass (light), or four times that.
+FLIPPED = [f"{name}-{kind}" for kind in ("light-flipped", "flipped") for name in FORMULATIONS]
 SLAVES = [1, 4, 16, 100, 1_000, 10_000, 100_000, 1_000_000]
 THREADS = [1, 2]
 COUNTED = 1024  # slaves of the instruction counts: in the caches, and the rest of the program small beside them
@@ -69,9 +71,8 @@ def cycles(bench: Path, slaves: list[int]) -> list[list[str]]:
         if n >= 10_000:
             for case in FORMULATIONS:
                 rows += run(bench, "kernels", case, n, "shuffled", 1)
-        if n in (1, 100, 10_000):
-            for case in OTHERS:
-                rows += run(bench, "kernels", case, n, 1) + run(bench, "kernels", f"{case}-consistent", n, 1)
+        for case in (WELDS if n in (1, 100, 10_000) else []) + (FLIPPED if n in (10_000, 1_000_000) else []):
+            rows += run(bench, "kernels", case, n, 1) + run(bench, "kernels", f"{case}-consistent", n, 1)
     return rows
 
 
@@ -144,7 +145,8 @@ def instructions(bench: Path) -> dict[str, float]:
         line = next(line for line in done.stderr.splitlines() if "Collected" in line)
         return int(line.split()[-1])
 
-    return {case: (total(case, many) - total(case, few)) / (many - few) / COUNTED for case in FORMULATIONS + CONSISTENT}
+    cases = FORMULATIONS + CONSISTENT + [f"{name}-flipped-consistent" for name in FORMULATIONS]
+    return {case: (total(case, many) - total(case, few)) / (many - few) / COUNTED for case in cases}
 
 
 def write_reference(counts: dict[str, float]) -> None:

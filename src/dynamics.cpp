@@ -101,12 +101,14 @@ void Dynamics::prepareMass() {
 }
 
 void Dynamics::updateMass() {
-  if (inertia_ && !inertia_->constant()) updateInertia();
+  if (inertia_ && !inertia_->constant() && massOf_ != ties.changes()) updateInertia();
 }
 
 void Dynamics::updateInertia() {
+  massOf_ = -1;  // not yet, if it throws
   inertia_->update(
       {ties, field(Field::slaveMass), field(Field::slaveInertia), field(Field::offset), segmentRotations()});
+  massOf_ = ties.changes();
 }
 
 // Of the nodes and segments that are factored; the others tell it when they are solved.
@@ -213,17 +215,11 @@ void Dynamics::evaluate() {
   solveIslands(a, z);
   if (!inertia_) return;
   updateMass();
-  // Where an iteration starts; else the free nodes' accelerations count as zero for now.
-  const bool guessed = has(Field::guess) && within(layout[Field::guess].count, field(Field::guess), 1e100);
+  if (has(Field::guess)) return iterate(a, z);
+  // The free nodes' accelerations count as zero for now.
   for (int i : islands_->alone().rest) {
-    at(a, first + i) = guessed ? Vec3(at(field(Field::guess), i)) : Vec3(0, 0, 0);
-    if (first + i >= turning) continue;
-    at(z, first + i) = guessed ? Vec3(at(field(Field::guess), model.free() + i)) : Vec3(0, 0, 0);
-  }
-  if (has(Field::guess)) {
-    leaveLoads();
-    inertia_->finish(ties, model.settings.solverTolerance, a, z);
-    return;
+    at(a, first + i).setZero();
+    if (first + i < turning) at(z, first + i).setZero();
   }
   const double *fs = loads.slaveForce(), *ts = loads.slaveMoment();
   if (ties.hasBias() || knownAccelerations_) {
@@ -244,18 +240,67 @@ void Dynamics::leaveLoads() {
   turnRate_ = std::max(turnRate_, std::sqrt(rate2));
 }
 
-void Dynamics::guessAccelerations(bool extrapolate) {
-  if (!has(Field::guess)) return;
-  const int first = 3 * model.freeBegin(), free = 3 * model.free(), turning = 3 * model.rotating() - first;
-  double *guess = field(Field::guess), *earlier = field(Field::earlier);
-  const auto take = [&](const double* now, int begin, int count) {
-    for (int i = 0; i < count; ++i) {
-      guess[begin + i] = extrapolate ? 2 * now[i] - earlier[begin + i] : now[i];
-      earlier[begin + i] = now[i];
+void Dynamics::iterate(double* a, double* z) {
+  const int first = model.freeBegin();
+  const double *guess = field(Field::guess), *jump = field(Field::jump);
+  double* solution = field(Field::solution);
+  const auto set = [&](auto value) {
+    for (int i : islands_->alone().rest) {
+      at(a, first + i) = value(i);
+      if (first + i < model.rotating()) at(z, first + i) = value(model.free() + i);
     }
   };
-  take(field(Field::acceleration) + first, 0, free);
-  take(field(Field::angularAcceleration) + first, free, turning);
+  const Along along{solution[Solution::jumpEnergy], jump - 3 * first, jump + 3 * (model.free() - first)};
+  set([&](int i) -> Vec3 { return at(guess, i); });
+  leaveLoads();
+  const bool afresh = !inertia_->start(ties, along);
+  if (afresh) {
+    set([](int) -> Vec3 { return Vec3::Zero(); });
+    leaveLoads();
+    inertia_->start(ties, along);
+  }
+  const Correction correction = inertia_->finish(ties, model.settings.solverTolerance, a, z);
+  solution[Solution::residual] = correction.residual;
+  solution[Solution::energy] = correction.energy;
+  solution[Solution::afresh] = afresh;
+}
+
+// body(values now, free nodes' values as in the fields of the iteration, how many)
+template <class Body> void Dynamics::eachFree(Body body) {
+  const int first = 3 * model.freeBegin(), free = 3 * model.free(), turning = 3 * model.rotating() - first;
+  body(field(Field::acceleration) + first, 0, free);
+  body(field(Field::angularAcceleration) + first, free, turning);
+}
+
+void Dynamics::rememberJump() {
+  if (!has(Field::guess)) return;
+  double *guess = field(Field::guess), *jump = field(Field::jump), *solution = field(Field::solution);
+  // The same inputs have left the same residual as in the step before.
+  if (solution[Solution::residual] == solution[Solution::residualInStep]) return;
+  const bool afresh = solution[Solution::afresh] != 0;
+  eachFree([&](const double* now, int begin, int count) {
+    for (int i = 0; i < count; ++i) jump[begin + i] = afresh ? now[i] : now[i] - guess[begin + i];
+  });
+  solution[Solution::jumpEnergy] = solution[Solution::energy];
+}
+
+void Dynamics::guessAccelerations() {
+  if (!has(Field::guess)) return;
+  double *guess = field(Field::guess), *increment = field(Field::increment);
+  eachFree([&](const double* now, int begin, int count) {
+    for (int i = 0; i < count; ++i) guess[begin + i] = now[i] + increment[begin + i];
+  });
+}
+
+void Dynamics::rememberIncrement() {
+  if (!has(Field::guess)) return;
+  double *guess = field(Field::guess), *increment = field(Field::increment), *solution = field(Field::solution);
+  const bool afresh = solution[Solution::afresh] != 0;
+  eachFree([&](const double* now, int begin, int count) {
+    for (int i = 0; i < count; ++i)
+      increment[begin + i] = afresh ? 0 : now[i] - (guess[begin + i] - increment[begin + i]);
+  });
+  solution[Solution::residualInStep] = solution[Solution::residual];
 }
 
 void Dynamics::setForceVelocities(double aheadOfLagged, double aheadOfPredicted) {

@@ -65,10 +65,12 @@ class Dynamics {
   // Velocities (3 per node) and spins (3 per rotating node) that the dampers and the bias see.
   const double* velocityFor(Field f) { return has(f) ? field(f) : field(Field::velocity); }
   const double* spinFor(Field f) { return has(f) ? field(f) + 3 * model.nodes() : field(Field::spin); }
-  // Where the next solution for the accelerations starts, from the present ones and those at the last such call, one
-  // substep before: with these two a straight line's next point, or the present ones. What was evaluated in between
-  // does not count, so that the answer to new inputs does not depend on those tried before.
-  void guessAccelerations(bool extrapolate);
+  // Where an iteration for the accelerations starts, and what it learns for the next time. What was evaluated between
+  // two steps does not count but for the last time, so that the answer to new inputs does not depend on those tried
+  // before.
+  void rememberJump();        // at the start of a step, of the solution there
+  void guessAccelerations();  // for the end of a substep: the present ones and their increment over the last one
+  void rememberIncrement();   // at the end of a substep, of the solution there
   // Sets `lagged` and `predicted`, where this model has them, from velocity and spin plus so many seconds of the
   // accelerations.
   void setForceVelocities(double aheadOfLagged, double aheadOfPredicted);
@@ -110,6 +112,8 @@ class Dynamics {
   void turnIntoLoads(const double* force, const double* moment);
   void solveIslands(double* a, double* z);
   void leaveLoads();
+  void iterate(double* a, double* z);
+  template <class Body> void eachFree(Body body);
   void updateInertia();
   void updateTurnRate(const double* v, const double* w);
   void advance(std::size_t count, double h, const double* rate, double* value);
@@ -121,6 +125,7 @@ class Dynamics {
   std::vector<double> right_, rightMoment_;                 // right side of the mass matrix
   std::vector<double> step_, stepSpin_;                     // velocities of a drift
   double turnRate_ = 0;
+  std::int64_t massOf_ = -1;  // Ties::changes() that the mass matrix belongs to
   bool knownAccelerations_ = false, positionsIntegrated_ = true, sumsReactions_ = true;
   std::unique_ptr<Islands> islands_;            // consistent inertia: segments by themselves,
   std::unique_ptr<ConsistentInertia> inertia_;  // and the rest; null: nothing is left

@@ -46,8 +46,10 @@ enum class Field : std::uint8_t {
   work,
   lagged,
   predicted,
-  earlier,
   guess,
+  increment,
+  jump,
+  solution,
   mode,
   highestFrequency,
   dampingRate,
@@ -71,12 +73,16 @@ enum class Field : std::uint8_t {
   nodalTimeStep,
 };
 
-// Entries of Field::work and of Field::energy.
+// Entries of Field::work, Field::energy and Field::solution.
 struct Work {
   enum Entry : int { external, dissipated, totalAtStart, totalAtLastStep, entries };
 };
 struct Energy {
   enum Entry : int { kinetic, strain, dissipated, external, residual, entries };
+};
+// See Correction (inertia.hpp). A guess worse than none is left: afresh is 1 then.
+struct Solution {
+  enum Entry : int { residual, energy, afresh, residualInStep, jumpEnergy, entries };
 };
 
 enum class Role : std::uint8_t {
@@ -175,10 +181,14 @@ inline constexpr FieldRow fieldRows[] = {
      When::damped},  // that the last damping forces used
     {Field::predicted, "predicted_velocity", "m/s, rad/s", 3, Per::nodeThenRotatingNode, Role::state,
      When::biased},  // that the last bias used
-    {Field::earlier, "earlier_acceleration", "m/s2, rad/s2", 3, Per::freeNodeThenRotatingNode, Role::state,
-     When::iterated},  // one substep before the last
     {Field::guess, "acceleration_guess", "m/s2, rad/s2", 3, Per::freeNodeThenRotatingNode, Role::state,
-     When::iterated},  // where the solution for the next accelerations starts
+     When::iterated},  // where the solution for the present accelerations starts
+    {Field::increment, "acceleration_increment", "m/s2, rad/s2", 3, Per::freeNodeThenRotatingNode, Role::state,
+     When::iterated},  // over the last substep, under the same inputs
+    {Field::jump, "acceleration_jump", "m/s2, rad/s2", 3, Per::freeNodeThenRotatingNode, Role::state,
+     When::iterated},  // with the last change of inputs
+    {Field::solution, "acceleration_solution", "1", Solution::entries, Per::simulation, Role::state,
+     When::iterated},
     {Field::mode, "mode", "1", 3, Per::freeNodeThenRotatingNode, Role::state, When::modeKept},  // of highestFrequency
     {Field::highestFrequency, "highest_frequency", "rad/s", 1, Per::simulation, Role::state},   // a bound
     {Field::dampingRate, "damping_rate", "1/s", 1, Per::simulation, Role::state},               // bound of M^-1 C

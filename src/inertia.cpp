@@ -12,6 +12,8 @@ namespace {
 
 // Up to this many unknowns (3-vectors) a fresh factor at every geometry costs little, and is exact to rounding.
 constexpr std::size_t smallSystem = 40;
+// Below this tolerance a constant factor of the translations is cheaper than iterations.
+constexpr double manyDigits = 1e-6;
 
 // Calls body(group, segment, slave (global), local slave) in order.
 template <class Body> void eachSlave(const Model& model, Body body) {
@@ -166,7 +168,7 @@ bool ConsistentInertia::iterates(const Model& model, const std::vector<int>& nod
   const int rotating = model.rotating() - model.freeBegin();
   const auto unknowns =
       nodes.size() + static_cast<std::size_t>(std::lower_bound(nodes.begin(), nodes.end(), rotating) - nodes.begin());
-  return model.turning() > 0 && unknowns > smallSystem;
+  return unknowns > smallSystem && (model.turning() > 0 || model.settings.solverTolerance >= manyDigits);
 }
 
 }  // namespace tiefmu

@@ -41,12 +41,21 @@ struct InertiaGeometry {
   const double* rotation;                  // of meanMotion segments, a unit quaternion each; null: not turned
 };
 
+// A direction in which the solution may lie, and its energy d . M d, about; 0: none.
+struct Along {
+  double energy = 0;
+  const double *a = nullptr, *z = nullptr;  // 3 per node (rotating node)
+};
+// What an iteration has done to its guess: r . B r before it, with B the inverse of the nodes' own blocks of M, and the
+// energy of the change.
+struct Correction { double residual = 0, energy = 0; };
+
 // The matrix M_m + T^T M_s T of free nodes that share segments, and solutions with it. A solution is a function of
 // geometry, right side and guess alone, so that a restored state continues with the same bits.
 class ConsistentInertia {
  public:
   // Of these free nodes (ascending, from 0), all other corners of whose segments are not free. Factored where the
-  // system is small, or constant and one number a node; solved by conjugate gradients else.
+  // system is small, or constant and one number a node and wanted to many digits; solved by conjugate gradients else.
   static std::unique_ptr<ConsistentInertia> of(const Model& model, const std::vector<int>& nodes);
   static bool iterates(const Model& model, const std::vector<int>& nodes);  // is it solved by conjugate gradients?
   virtual ~ConsistentInertia() = default;
@@ -60,14 +69,15 @@ class ConsistentInertia {
   // m. An iteration ends when the residual is `tolerance` of the right side, theory (4.7).
   virtual void solve(const Ties& ties, double tolerance, const double* force, const double* moment, double* a,
                      double* z) = 0;
-  // The same for loads on nodes and slaves and the bias, where an iteration does it: first what these and the slaves'
-  // inertia leave with the guess `a`, `z`, and the largest |w|^2 of a slave, (rad/s)^2; then what the guess lacks. A
-  // guess worse than none is forgotten.
+  // The same for loads on nodes and slaves and the bias, where an iteration does it. First what these and the slaves'
+  // inertia leave with the guess `a`, `z`; returns the largest |w|^2 of a slave, (rad/s)^2.
   virtual double leave(const Ties&, const SegmentLoads&, const double* /*offset*/, const double* /*a*/,
                        const double* /*z*/) {
     return 0;
   }
-  virtual void finish(const Ties&, double /*tolerance*/, double* /*a*/, double* /*z*/) {}
+  // Then whether the guess is better than none, and at last what it lacks.
+  virtual bool start(const Ties&, const Along&) { return true; }
+  virtual Correction finish(const Ties&, double /*tolerance*/, double* /*a*/, double* /*z*/) { return {}; }
 
  protected:
   ConsistentInertia(const Model& model, const std::vector<int>& nodes);

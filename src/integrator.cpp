@@ -23,13 +23,15 @@ bool Integrator::step(double tau, double h) {
     case Method::centralDifference:
       // Half kick, drift, half kick. Dampers and the bias see the half-step velocity extrapolated to the end of the
       // step, without which the order would drop to one; dampers only as far as the step stays stable.
+      d.rememberJump();
       d.kick(0.5 * h);
       d.inputsOver(tau, h);
       d.drift(h, 0);
       d.inputsAt(tau, h);
       d.setForceVelocities(0.5 * h * prediction(h), 0.5 * h);
-      d.guessAccelerations(true);
+      d.guessAccelerations();
       d.evaluate();
+      d.rememberIncrement();
       d.kick(0.5 * h);
       return true;
     case Method::symplecticEuler:
@@ -38,20 +40,23 @@ bool Integrator::step(double tau, double h) {
       d.drift(h, 0);
       d.inputsAt(tau, h);
       d.setForceVelocities(0, 0);
-      d.guessAccelerations(true);
+      d.rememberIncrement();
+      d.guessAccelerations();
       return false;
     case Method::nohBathe: {
       const double h1 = nohBathe::p * h, h2 = (1 - nohBathe::p) * h;
       static_assert(adjacent(Field::acceleration, Field::angularAcceleration));
       double* a = d.field(Field::acceleration);  // both
+      d.rememberJump();
       d.inputsOver(tau, h1);
       d.drift(h1, 0.5 * h1);
       d.inputsAt(tau, h1);
       d.setForceVelocities(h1, h1);
       d.kick(0.5 * h1);
       std::copy_n(a, earlier_.size(), earlier_.begin());
-      d.guessAccelerations(true);
+      d.guessAccelerations();
       d.evaluate();
+      d.rememberIncrement();
       d.kick(0.5 * h1);
       d.inputsOver(tau + h1, h2);
       d.drift(h2, 0.5 * h2);
@@ -62,8 +67,9 @@ bool Integrator::step(double tau, double h) {
       std::swap_ranges(earlier_.begin(), earlier_.end(), a);
       d.kick(nohBathe::q0 * h2);
       std::swap_ranges(earlier_.begin(), earlier_.end(), a);
-      d.guessAccelerations(true);
+      d.guessAccelerations();
       d.evaluate();
+      d.rememberIncrement();
       d.kick(nohBathe::q2 * h2);
       return true;
     }
@@ -92,7 +98,7 @@ void Integrator::rungeKutta(double tau, double h) {
       d.inputsAt(tau, ahead[stage - 1] * h);
       d.ties.updateGeometry();
       d.setForceVelocities(0, 0);
-      d.guessAccelerations(false);
+      d.guessAccelerations();
       d.evaluate();
     }
     d.rates(rates_.data());
@@ -106,7 +112,7 @@ void Integrator::rungeKutta(double tau, double h) {
   d.normalise();
   d.ties.updateGeometry();
   d.setForceVelocities(0, 0);
-  d.guessAccelerations(false);
+  d.guessAccelerations();
 }
 
 }  // namespace tiefmu

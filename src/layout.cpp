@@ -53,7 +53,7 @@ bool isPresent(const FieldRow& row, const Model& model) {
     case When::biased:
       return model.anyFree() && model.settings.inertia == Inertia::consistent && model.finite() && model.turning() > 0;
     case When::iterated:
-      return model.anyFree() && model.settings.inertia == Inertia::consistent && model.turning() > 0 &&
+      return model.anyFree() && model.settings.inertia == Inertia::consistent &&
              ConsistentInertia::iterates(model, SegmentsAlone(model).rest);
     case When::modeKept: return model.anyFree() && model.finite() && !model.springs.empty();
     case When::exposed: return model.exposes(row.exposedAs);

@@ -207,6 +207,11 @@ void Simulation::inputsChanged() {
   impl_->dynamics.takeDrivenVelocities();
 }
 
+void Simulation::statesChanged() {
+  inputsChanged();
+  impl_->geometryDirty = true;
+}
+
 void Simulation::parametersChanged() {
   impl_->parametersDirty = true;
   inputsChanged();

@@ -22,12 +22,13 @@ class Simulation {
   const Layout& layout() const;
   double time() const;  // s
 
-  // The array. After writing to it call `inputsChanged` (inputs, states) or `parametersChanged`.
+  // The array. After writing to it call `inputsChanged`, `statesChanged` or `parametersChanged`.
   double* data();
   const double* data() const;
   double* field(Field f) { return data() + layout()[f].offset; }
   const double* field(Field f) const { return data() + layout()[f].offset; }
   void inputsChanged();
+  void statesChanged();
   void parametersChanged();
 
   // Back to the start values, as constructed.

@@ -51,6 +51,7 @@ TieGeometry Ties::geometry(std::size_t g) const {
 }
 
 void Ties::updateFramesAtStart() {
+  ++changes_;
   eachGroup([&](const TieGroup& group, SegmentRange range, TieGeometry, std::size_t g) {
     if (group.coupling == Coupling::meanMotion)
       if (!updateFrames(group, range, model_.nodePosition.data(), frames_.data() + firstFrame_[g]))
@@ -59,6 +60,7 @@ void Ties::updateFramesAtStart() {
 }
 
 void Ties::updateGeometry() {
+  ++changes_;
   if (!model_.finite()) return;
   eachPart([&](const TieGroup& group, SegmentRange range, TieGeometry, std::size_t g) {
     if (group.coupling != Coupling::meanMotion) return;
@@ -161,6 +163,7 @@ double Ties::largestSpin2(const double* v, const std::vector<std::vector<std::ui
 }
 
 void Ties::move(double h, const double* v, const double* w) {
+  ++changes_;
   const bool turns = has(Field::segmentRotation);
   eachPart([&](const TieGroup& group, SegmentRange range, TieGeometry shape, std::size_t g) {
     if (group.coupling == Coupling::rotation && offsetsTurn_)
@@ -202,6 +205,7 @@ void Ties::rates(const double* v, const double* w, double* offsetRate, double* r
 }
 
 void Ties::normaliseOffsets() {
+  ++changes_;
   if (!offsetsTurn_) return;
   for (const TieGroup& group : model_.groups) {
     if (group.coupling != Coupling::rotation) continue;

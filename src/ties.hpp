@@ -29,6 +29,8 @@ class Ties {
   // Node ids of a meanMotion segment whose nodes have come to lie on a line, so that its motion is not defined: "1, 2,
   // 3". Empty: none.
   std::string findCollapsedSegment();
+  // Counts them; a mass matrix that was made at the same number is that of the present geometry.
+  std::int64_t changes() const { return changes_; }
   TieGeometry geometry(std::size_t group) const;
   const std::vector<SegmentFrame>& frames() const { return frames_; }
   std::size_t firstFrame(std::size_t group) const { return firstFrame_[group]; }
@@ -81,6 +83,7 @@ class Ties {
   std::vector<double> us_, turns_;         // scratch: slaves' displacements or velocities
   std::atomic<bool> noneCollapsed_{true};  // no kernel has met a collapsed segment since the last look
   std::unique_ptr<ThreadPool> pool_;       // none where one thread does it all
+  std::int64_t changes_ = 0;
   bool offsetsTurn_ = false, bias_ = false;
 };
 

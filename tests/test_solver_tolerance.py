@@ -97,7 +97,7 @@ def test_a_bad_guess_does_no_harm(bad, formulation, rotations):
     for each in (plain, program):
         each.step(1e-3)
     simulation = program.simulation
-    simulation.set("earlier_acceleration", np.full(simulation.fields["earlier_acceleration"], bad))
+    simulation.set("acceleration_increment", np.full(simulation.fields["acceleration_increment"], bad))
     for each in (plain, program):
         each.step(1e-3)
     a, b = (each.simulation.get("acceleration") for each in (plain, program))

@@ -114,7 +114,12 @@ class NamedSimulation {
   }
 
   void changed(Field f) {
-    rowOf(f).role == Role::parameter ? simulation.parametersChanged() : simulation.inputsChanged();
+    switch (rowOf(f).role) {
+      case Role::parameter: return simulation.parametersChanged();
+      case Role::motion:
+      case Role::state: return simulation.statesChanged();
+      default: return simulation.inputsChanged();
+    }
   }
 
   // Block of the variable and its place in the data.
