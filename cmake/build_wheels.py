@@ -21,6 +21,7 @@ from tiefmu.binaries import BUILT, CHECKOUT, is_stale, missing
 from tiefmu.platforms import BY_FOLDER, PLATFORMS
 
 TAGS = {"linux64": "manylinux_2_17_x86_64", "aarch64-linux": "manylinux_2_17_aarch64", "win64": "win_amd64"}
+EPOCH = "315532800"  # 1980, the first date of an archive
 WORK = CHECKOUT / "build" / "wheels"
 STUBS = CHECKOUT / "build" / "python" / "stubs"  # from this system's module, as the others' cannot be run
 VERSION = "import sys, sysconfig; print(sys.version_info[1], sysconfig.get_path('include'))"
@@ -71,13 +72,23 @@ def build(folder: str, minor: int, python: str, include: Path, zig: Path) -> int
         settings["wheel.py-api"] = "cp312"
     settings |= {f"cmake.define.{key}": str(value) for key, value in define.items()}
     environment = os.environ | {
-        "_PYTHON_HOST_PLATFORM": TAGS[folder],
+        "_PYTHON_HOST_PLATFORM": TAGS[folder].replace("manylinux_2_17", "linux"),
         "SETUPTOOLS_EXT_SUFFIX": f".cpython-3{minor}-{platform.machine}-linux-gnu.so",
         "PYTHONPATH": os.pathsep.join([sysconfig.get_path("purelib"), str(WORK / "backports")]),
         "PYTHONDONTWRITEBYTECODE": "1",
     }
-    done = subprocess.run([python, "-c", BUILD, CHECKOUT / "dist", json.dumps(settings)], cwd=CHECKOUT, env=environment)
-    return fail(f"{folder}, {python}: the build ended with status {done.returncode}") if done.returncode else 0
+    made = WORK / "made"
+    shutil.rmtree(made, ignore_errors=True)
+    done = subprocess.run([python, "-c", BUILD, made, json.dumps(settings)], cwd=CHECKOUT, env=environment)
+    if done.returncode != 0:
+        return fail(f"{folder}, {python}: the build ended with status {done.returncode}")
+    (wheel,) = made.glob("*.whl")
+    retag = [sys.executable, "-m", "wheel", "tags", "--remove", "--platform-tag", TAGS[folder], wheel]
+    subprocess.run(retag, check=True, env=os.environ | {"SOURCE_DATE_EPOCH": EPOCH})
+    (CHECKOUT / "dist").mkdir(exist_ok=True)
+    (wheel,) = made.glob("*.whl")
+    shutil.move(wheel, CHECKOUT / "dist" / wheel.name)
+    return 0
 
 
 def for_windows(include: Path, compiler: Path) -> dict:
