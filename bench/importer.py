@@ -77,7 +77,7 @@ def main() -> None:
             path = tiefmu.build(tiefmu.load(SCENES / f"{name}.toml"), Path(folder) / f"{name}.fmu")
             with Fmu(path) as fmu:
                 inputs = SCENES / f"{name}.csv"
-                signals = read_inputs(inputs, fmu.description)
+                signals = read_inputs(inputs, fmu.variables)
                 step = float(signals["time"][-1]) / STEPS
                 plan = experiment(fmu, None, step, inputs)
                 outputs = fmu.outputs()

@@ -4,7 +4,7 @@
 #include <bit>
 #include <iterator>
 
-#include "state.hpp"
+#include "call.hpp"
 
 namespace tiefmu::fmi2 {
 
@@ -16,22 +16,7 @@ inline constexpr const char* stateNames[] = {"instantiated", "initializationMode
 
 constexpr const char* stateName(State state) { return stateNames[std::countr_zero(static_cast<unsigned>(state))]; }
 
-struct Call {
-  const char* name;
-  unsigned allowed;  // states, by their bits
-
-  constexpr bool isAllowedIn(State state) const { return (allowed & static_cast<unsigned>(state)) != 0; }
-};
-
-consteval unsigned row(const char* marks) {
-  unsigned states = 0, bit = 1;
-  for (; *marks; ++marks)
-    if (*marks != ' ') {
-      if (*marks == 'x') states |= bit;
-      bit <<= 1;
-    }
-  return bit == 1u << std::size(stateNames) ? states : throw "a row has one mark for each state";
-}
+consteval unsigned row(const char* marks) { return marked(marks, std::size(stateNames)); }
 
 // fmi2GetTypesPlatform, fmi2GetVersion, fmi2Instantiate and fmi2FreeInstance need no instance or end it, and are
 // always allowed.

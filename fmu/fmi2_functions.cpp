@@ -1,7 +1,6 @@
 // The functions of FMI 2.0 co-simulation. Each goes through `guard`: no exception leaves the library.
 #include <cstdio>
 #include <cstring>
-#include <exception>
 #include <type_traits>
 
 #include "fmi2_calls.hpp"
@@ -14,7 +13,6 @@ extern "C" {
 
 using namespace tiefmu;
 namespace call = fmi2::call;
-using fmi2::Call;
 
 static_assert(std::is_same_v<fmi2ValueReference, std::uint32_t> && std::is_same_v<fmi2Real, double> &&
               std::is_same_v<fmi2Integer, int> && std::is_same_v<fmi2Byte, char> &&
@@ -64,30 +62,8 @@ class CallbackLog final : public Log {
   std::string instanceName_;
 };
 
-// Runs body(instance) where the call is allowed. What goes wrong is logged and returned as fmi2Error; unless the call
-// was merely refused, the instance is then in the state `error`, which only fmi2Reset and fmi2SetFMUstate leave.
 template <class Body> fmi2Status guard(fmi2Component component, const Call& call, Body body) noexcept {
-  auto* instance = static_cast<Instance*>(component);
-  if (!instance) return fmi2Error;
-  const auto fail = [&](const char* message, State next) {
-    char line[2000];  // no allocation: memory may be what is lacking
-    std::snprintf(line, sizeof line, "%s: %s", call.name, message);
-    instance->state = next;
-    instance->log->write(Severity::error, Category::error, line);
-    return fmi2Error;
-  };
-  try {
-    if (!call.isAllowedIn(instance->state))
-      throw Refused(std::string("not allowed in state ") + fmi2::stateName(instance->state));
-    body(*instance);
-    return fmi2OK;
-  } catch (const Refused& e) {
-    return fail(e.what(), instance->state);
-  } catch (const std::exception& e) {
-    return fail(e.what(), State::error);
-  } catch (...) {
-    return fail("unknown exception", State::error);
-  }
+  return succeeds(static_cast<Instance*>(component), call, fmi2::stateName, body) ? fmi2OK : fmi2Error;
 }
 
 // For the variable types that no scene has: only an empty call is right.

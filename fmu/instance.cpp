@@ -145,29 +145,59 @@ void Instance::refuseValue(std::uint32_t first, const double* values) const {
                 (std::isnan(values[bad]) ? "NaN" : "an infinite value"));
 }
 
+void Instance::get(const std::vector<Span>& spans, double values[]) {
+  try {
+    simulation.updateOutputs();
+  } catch (const std::exception&) {
+    if (state != State::error) throw;
+  }
+  for (const Span& s : spans) {
+    copy(simulation.data() + s.place, s.count, values);
+    values += s.count;
+  }
+}
+
+void Instance::prepareRun(const Range& range, std::uint32_t first, std::size_t count, const double* from,
+                          Changed& changed) {
+  double* to = simulation.data() + range.place + (first - range.first);
+  if (range.causality == Causality::input)
+    changed.inputs = true;
+  else if (range.causality == Causality::parameter && state != State::stepComplete && state != State::inStep)
+    changed.parameters = true;
+  else if (range.causality != Causality::parameter)
+    refuseToSet(range, first);
+  else  // the value that it has may be set again: some importers set all parameters before every run
+    for (std::size_t k = 0; k < count; ++k)
+      if (from[k] != to[k]) refuseToSet(range, first + static_cast<std::uint32_t>(k));
+  if (!allFinite(from, count)) refuseValue(first, from);
+  runs.push_back({from, to, count});
+}
+
+void Instance::copyRuns(Changed changed) {
+  for (const Run& run : runs) copy(run.from, run.count, run.to);
+  if (changed.parameters) simulation.parametersChanged();
+  if (changed.inputs) simulation.inputsChanged();
+}
+
+// First all checks: a refused call changes nothing.
 void Instance::set(const std::uint32_t refs[], std::size_t count, const double values[]) {
   if (count > 0 && !values) throw Refused("the array of values is a null pointer");
-  bool parameters = false, inputs = false;
-  double* data = simulation.data();
+  Changed changed;
   runs.clear();
-  // First all checks: a refused call changes nothing.
   forRuns(refs, count, [&](const Range& range, std::uint32_t first, std::size_t run, std::size_t i) {
-    if (range.causality == Causality::input)
-      inputs = true;
-    else if (range.causality == Causality::parameter && state != State::stepComplete)
-      parameters = true;
-    else if (range.causality != Causality::parameter)
-      refuseToSet(range, first);
-    else  // the value that it has may be set again: some importers set all parameters before every run
-      for (std::size_t k = 0; k < run; ++k)
-        if (values[i + k] != data[range.place + (first - range.first) + k])
-          refuseToSet(range, first + static_cast<std::uint32_t>(k));
-    if (!allFinite(values + i, run)) refuseValue(first, values + i);
-    runs.push_back({values + i, data + range.place + (first - range.first), run});
+    prepareRun(range, first, run, values + i, changed);
   });
-  for (const Run& run : runs) copy(run.from, run.count, run.to);
-  if (parameters) simulation.parametersChanged();
-  if (inputs) simulation.inputsChanged();
+  copyRuns(changed);
+}
+
+void Instance::set(const std::vector<Span>& spans, const double values[]) {
+  Changed changed;
+  runs.clear();
+  for (const Span& s : spans) {
+    prepareRun(rangeOf(s.first), s.first, s.count, values, changed);
+    values += s.count;
+  }
+  copyRuns(changed);
 }
 
 void Instance::doStep(double point, double step) {

@@ -8,7 +8,7 @@
 #include <unordered_map>
 #include <vector>
 
-#include "../modelDescription/variables.hpp"
+#include "../modelDescription/arrays.hpp"
 #include "../src/host_step.hpp"
 #include "log.hpp"
 #include "refused.hpp"
@@ -47,7 +47,13 @@ class Instance {
   void reset();
   void get(const std::uint32_t references[], std::size_t count, double values[]);
   void set(const std::uint32_t references[], std::size_t count, const double values[]);
+  // The same for whole spans, whose values follow each other in `values`.
+  void get(const std::vector<Span>& spans, double values[]);
+  void set(const std::vector<Span>& spans, const double values[]);
   void doStep(double currentCommunicationPoint, double communicationStepSize);
+  double largestSubstep() const { return simulation.largestSubstep(); }
+  const Model& model() const { return simulation.model(); }
+  std::vector<Block> blocks() const { return variables(simulation.model(), simulation.layout()); }
   double time() const { return clock.time; }
 
   // Saved states are handles that the instance owns until `freeState`, or until its end.
@@ -81,7 +87,12 @@ class Instance {
     std::size_t count;
   };
 
+  struct Changed { bool parameters = false, inputs = false; };
+
   const Range& rangeOf(std::uint32_t reference) const;
+  // Throws Refused, or puts down a run that `copyRuns` then takes over.
+  void prepareRun(const Range& range, std::uint32_t first, std::size_t count, const double* from, Changed& changed);
+  void copyRuns(Changed changed);
   [[noreturn]] void refuseToSet(const Range& range, std::uint32_t reference) const;
   [[noreturn]] void refuseValue(std::uint32_t first, const double* values) const;
   std::string nameOf(std::uint32_t reference) const;

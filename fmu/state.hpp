@@ -8,6 +8,7 @@ enum class State : unsigned {  // bits; the numbers stand in serialised states
   instantiated = 1,
   initialization = 2,
   stepComplete = 4,
+  inStep = 8,  // in a call back to the importer from the middle of a step
   terminated = 64,
   error = 128,
 };

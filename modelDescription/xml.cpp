@@ -8,40 +8,10 @@
 #include "../src/host_step.hpp"
 #include "dependencies.hpp"
 #include "variables.hpp"
+#include "xml_text.hpp"
 
 namespace tiefmu {
 namespace {
-
-struct UnitRow {
-  const char* name;
-  const char* base;      // attributes of BaseUnit
-  const char* quantity;  // name of the type that has this unit
-};
-
-// Every unit of the table of variables. A unit belongs to one quantity.
-constexpr UnitRow units[] = {
-    {"1", "", "Ratio"},
-    {"m", R"( m="1")", "Length"},
-    {"m/s", R"( m="1" s="-1")", "Velocity"},
-    {"m/s2", R"( m="1" s="-2")", "Acceleration"},
-    {"rad/s", R"( s="-1" rad="1")", "AngularVelocity"},
-    {"rad/s2", R"( s="-2" rad="1")", "AngularAcceleration"},
-    {"s", R"( s="1")", "Time"},
-    {"kg", R"( kg="1")", "Mass"},
-    {"kg.m2", R"( kg="1" m="2")", "MomentOfInertia"},
-    {"N", R"( kg="1" m="1" s="-2")", "Force"},
-    {"N.m", R"( kg="1" m="2" s="-2")", "Moment"},
-    {"N/m", R"( kg="1" s="-2")", "Stiffness"},
-    {"N.m/rad", R"( kg="1" m="2" s="-2" rad="-1")", "RotationalStiffness"},
-    {"J", R"( kg="1" m="2" s="-2")", "Energy"},
-    {"W", R"( kg="1" m="2" s="-3")", "Power"},
-};
-
-constexpr const UnitRow* unitRow(std::string_view name) {
-  for (const UnitRow& u : units)
-    if (name == u.name) return &u;
-  return nullptr;
-}
 
 static_assert(std::all_of(std::begin(variableRows), std::end(variableRows),
                           [](const Variable& v) { return unitRow(v.row().unit) != nullptr; }),
@@ -50,39 +20,11 @@ static_assert(std::all_of(std::begin(variableRows), std::end(variableRows),
 // The common validator takes 2 ms for each structured name.
 constexpr std::size_t mostStructuredNames = 10000;
 
-// Integers, and doubles as the shortest text that reads back to the same double.
-template <class Number> void appendNumber(std::string& out, Number number) {
-  char text[32];
-  out.append(text, std::to_chars(text, text + sizeof text, number).ptr);
-}
-
-// Text as an attribute value. XML 1.0 knows no control characters but tab and line ends, and those become blanks in
-// an attribute anyway.
-void appendEscaped(std::string& out, std::string_view text) {
-  for (char c : text) switch (c) {
-      case '&': out += "&amp;"; break;
-      case '<': out += "&lt;"; break;
-      case '>': out += "&gt;"; break;
-      case '"': out += "&quot;"; break;
-      default: out += static_cast<unsigned char>(c) < 0x20 || c == 0x7f ? ' ' : c;
-    }
-}
-
-void attribute(std::string& out, std::string_view name, std::string_view value) {
-  out += ' ';
-  out += name;
-  out += "=\"";
-  appendEscaped(out, value);
-  out += '"';
-}
-
 double fromText(const std::string& text) {
   double value = 0;
   std::from_chars(text.data(), text.data() + text.size(), value);
   return value;
 }
-
-struct Experiment { double step, stop; };
 
 // A thousand steps: of 1 ms, or where the step has a limit, of one substep or of what an explicit host may take, the
 // shorter one, rounded down to 1, 2 or 5 times a power of ten.
@@ -137,25 +79,6 @@ const char* causalityAttributes(Causality causality) {
   }
   return "";
 }
-
-// Text on its way to the caller, handed over whenever there is a piece of it.
-class Out {
- public:
-  explicit Out(const std::function<void(std::string_view)>& sink) : sink_(sink) { text_.reserve(piece + piece / 4); }
-  std::string& text() { return text_; }
-  void row() {
-    if (text_.size() > piece) flush();
-  }
-  void flush() {
-    sink_(text_);
-    text_.clear();
-  }
-
- private:
-  static constexpr std::size_t piece = 1 << 20;
-  const std::function<void(std::string_view)>& sink_;
-  std::string text_;
-};
 
 void appendHead(std::string& out, const std::string& name, const std::string& title, const std::string& guid,
                 bool structured) {
@@ -233,8 +156,8 @@ void appendVariables(Out& to, const std::vector<Block>& blocks, const std::vecto
 // ModelStructure: outputs depend on inputs; initial unknowns on inputs and parameters.
 class Structure {
  public:
-  Structure(const Model& model, const std::vector<Block>& table, const std::vector<Place>& places)
-      : blocks(table), listed(places), rows(dependencies(model, table)) {
+  Structure(const std::vector<Block>& table, const std::vector<Place>& places, const Dependencies& of)
+      : blocks(table), listed(places), rows(of) {
     index.resize(rows.all.size());
     isParameter.resize(rows.all.size());
     std::uint32_t next = 1;
@@ -312,7 +235,7 @@ class Structure {
 
   const std::vector<Block>& blocks;
   const std::vector<Place>& listed;
-  const Dependencies rows;
+  const Dependencies& rows;
   std::vector<std::uint32_t> index;  // of each value reference in the listing, from 1
   std::vector<std::uint8_t> isParameter;
 };
@@ -329,28 +252,20 @@ std::string modelIdentifier(const std::string& name) {
   return identifier.empty() ? "_" : identifier;
 }
 
-struct Xml::Contents {
-  std::string name, title;
-  bool structuredNames = true;
-  std::vector<double> start;
-  Experiment experiment;
-  std::vector<Block> blocks;
-  std::vector<Place> places;
-  Structure structure;
+struct Xml::Contents : Described {
+  Contents(const Model& model, std::string name, std::string title)
+      : Contents(model, Simulation(std::shared_ptr<const Model>(std::shared_ptr<void>(), &model)), std::move(name),
+                 std::move(title)) {}
 
-  Contents(const Model& model, std::string n, std::string t)
-      : Contents(model, Simulation(std::shared_ptr<const Model>(std::shared_ptr<void>(), &model)), std::move(n),
-                 std::move(t)) {}
+  bool structuredNames = true;
 
  private:
   Contents(const Model& model, Simulation&& simulation, std::string n, std::string t)
-      : name(std::move(n)),
-        title(std::move(t)),
-        start(simulation.data(), simulation.data() + simulation.layout().size),
-        experiment((simulation.initialise(0), defaultExperiment(model, simulation))),
-        blocks(variables(model, simulation.layout())),
-        places(listing(blocks)),
-        structure(model, blocks, places) {
+      : Described{&model, std::move(n), std::move(t), {simulation.data(), simulation.data() + simulation.layout().size}, {}, {}, {}} {
+    simulation.initialise(0);
+    experiment = defaultExperiment(model, simulation);
+    blocks = variables(model, simulation.layout());
+    dependencies = tiefmu::dependencies(model, blocks);
     std::size_t count = 0;
     for (const Block& b : blocks) count += b.count();
     // Structured names have numbers in brackets, where ports have names.
@@ -364,7 +279,8 @@ Xml::~Xml() = default;
 
 double Xml::stepSize() const { return contents_->experiment.step; }
 
-void Xml::write(const std::string& guid, const std::function<void(std::string_view)>& sink) const {
+void Xml::write(Standard standard, const std::string& guid, const Sink& sink) const {
+  if (standard == Standard::fmi3) return writeFmi3(*contents_, guid, sink);
   const Contents& c = *contents_;
   Out out(sink);
   appendHead(out.text(), c.name, c.title, guid, c.structuredNames);
@@ -374,8 +290,9 @@ void Xml::write(const std::string& guid, const std::function<void(std::string_vi
   out.text() += "\" stepSize=\"";
   appendNumber(out.text(), c.experiment.step);
   out.text() += "\"/>\n";
-  appendVariables(out, c.blocks, c.places, c.start.data());
-  c.structure.append(out);
+  const std::vector<Place> places = listing(c.blocks);
+  appendVariables(out, c.blocks, places, c.start.data());
+  Structure(c.blocks, places, c.dependencies).append(out);
   out.text() += "</fmiModelDescription>\n";
   out.flush();
 }

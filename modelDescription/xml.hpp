@@ -1,6 +1,7 @@
-// modelDescription.xml of FMI 2.0 co-simulation.
+// modelDescription.xml of co-simulation, by FMI 2.0 and 3.0.
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <string>
@@ -28,6 +29,8 @@ inline constexpr LogCategory logCategories[] = {
 // file name of the FMU's binary.
 std::string modelIdentifier(const std::string& name);
 
+enum class Standard : std::uint8_t { fmi2, fmi3 };
+
 // The text of a model, which must outlive it. Analysed once, written as often as asked for.
 class Xml {
  public:
@@ -36,8 +39,8 @@ class Xml {
   Xml(const Model& model, std::string name, std::string title);
   ~Xml();
   double stepSize() const;  // of the default experiment, s
-  // guid: what fmi2Instantiate compares. Large models take hundreds of megabytes: `sink` gets the text piece by piece.
-  void write(const std::string& guid, const std::function<void(std::string_view)>& sink) const;
+  // guid: what the instantiation compares: GUID of FMI 2.0, instantiation token of 3.0. Large models take hundreds of megabytes: `sink` gets the text piece by piece.
+  void write(Standard standard, const std::string& guid, const std::function<void(std::string_view)>& sink) const;
 
  private:
   struct Contents;

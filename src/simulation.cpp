@@ -329,6 +329,10 @@ void Simulation::step(double duration) {
   }
 }
 
+double Simulation::largestSubstep() const {
+  return impl_->model->anyFree() ? impl_->limit.ofStep() : std::numeric_limits<double>::infinity();
+}
+
 void Simulation::updateOutputs() {
   Impl& s = *impl_;
   s.updatePorts();

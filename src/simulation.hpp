@@ -68,6 +68,8 @@ class Simulation {
 
   // Forces evaluated so far (a machine-independent cost).
   std::int64_t evaluations() const;
+  // The most that a substep takes now, s; infinite where nothing is integrated.
+  double largestSubstep() const;
   // Largest step the chosen integrator is stable at, damping included, s (1e30: none).
   double integratorLimit() const;
 

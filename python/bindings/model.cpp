@@ -175,10 +175,12 @@ void bindModel(nb::module_& m) {
            "name: of the scene; title: free text. Raises SceneError where the model cannot start.")
       .def(
           "write",
-          [](const Xml& description, const std::string& guid, nb::callable sink) {
-            description.write(guid, [&](std::string_view text) { sink(nb::bytes(text.data(), text.size())); });
+          [](const Xml& description, int fmi, const std::string& guid, nb::callable sink) {
+            require(fmi == 2 || fmi == 3, "fmi: 2 or 3");
+            description.write(fmi == 3 ? Standard::fmi3 : Standard::fmi2, guid,
+                              [&](std::string_view text) { sink(nb::bytes(text.data(), text.size())); });
           },
-          "guid"_a, "sink"_a, "Calls sink(bytes) with the text, piece by piece.")
+          "fmi"_a, "guid"_a, "sink"_a, "Calls sink(bytes) with the text, piece by piece. fmi: 2 or 3.")
       .def_prop_ro("step_size", &Xml::stepSize, "Of the default experiment, s.");
   m.def("nodal_step", nb::overload_cast<double, double>(&nodalStep), "inertia"_a, "stiffness"_a,
         "sqrt(2 m/K) or sqrt(2 I/Kr) of a node, s [theory (6.3)]; 1e30 where nothing limits it.");

@@ -89,6 +89,9 @@ def parser() -> argparse.ArgumentParser:
         help=f"systems that the FMU is for, of {', '.join(BY_FOLDER)} (default: this one, linux64 and win64, "
         "in a checkout as far as `make binaries` has built them)",
     )
+    build.add_argument(
+        "--fmi", type=int, choices=(2, 3), default=2, help="version of the standard (default: 2); 3 has arrays for large ties"
+    )
     build.set_defaults(command=run_build)
 
     info = commands.add_parser(
@@ -160,7 +163,7 @@ def parser() -> argparse.ArgumentParser:
 def run_build(options: argparse.Namespace) -> None:
     scene = load(options.scene)
     criteria = accept_command.packed(options.criteria) if options.criteria else {}
-    fmu = build(scene, options.output or Path(f"{scene.name}.fmu"), criteria, options.platforms)
+    fmu = build(scene, options.output or Path(f"{scene.name}.fmu"), criteria, options.platforms, options.fmi)
     found = report(scene)
     show_warnings(options.scene, found)
     if not options.platforms and stale():

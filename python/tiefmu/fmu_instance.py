@@ -1,10 +1,11 @@
-"""FMUs and their instances on FMPy's FMU2Slave: a step is three calls, on preallocated arrays."""
+"""FMUs and their instances on FMPy's FMU2Slave and FMU3Slave: a step is three calls, on preallocated arrays."""
 
 import contextlib
 import ctypes
 import io
 import itertools
 import tempfile
+import zipfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,8 @@ from typing import Any
 import numpy as np
 
 from .errors import RunError
+from .fmi3_variables import elements
+from .fmi_access import Access2, Access3, moving_pointer
 from .platforms import LibraryError, here, library_of
 from .signals import Experiment, one_line
 
@@ -20,9 +23,9 @@ INPUTS_AHEAD = 2**22  # bytes of inputs computed at a time
 
 
 class Fmu:
-    """An FMI 2.0 co-simulation FMU, described and unpacked; a context manager that removes what it unpacked.
+    """An FMI 2.0 or 3.0 co-simulation FMU, described and unpacked; a context manager that removes what it unpacked.
 
-    description: FMPy's; name: how messages call it.
+    description: FMPy's; variables: by name, of arrays each element (fmi3_variables.py); name: how messages call it.
     """
 
     def __init__(self, path: Path, name: str | None = None):
@@ -34,9 +37,14 @@ class Fmu:
             self.description = fmpy.read_model_description(str(path), validate=False)
         except Exception as error:
             raise RunError(f"{self.name}: not an FMU that FMPy can read: {one_line(error)}") from None
-        if self.description.fmiVersion != "2.0" or self.description.coSimulation is None:
-            raise RunError(f"{self.name}: not an FMU for co-simulation by FMI 2.0")
-        self.variables = {variable.name: variable for variable in self.description.modelVariables}
+        self.fmi = {"2.0": 2, "3.0": 3}.get(self.description.fmiVersion)
+        if self.fmi is None or self.description.coSimulation is None:
+            raise RunError(f"{self.name}: not an FMU for co-simulation by FMI 2.0 or 3.0")
+        variables = self.description.modelVariables
+        if self.fmi == 3:
+            with zipfile.ZipFile(path) as archive:
+                variables = elements(self.description, archive.read("modelDescription.xml"))
+        self.variables: dict[str, Any] = {variable.name: variable for variable in variables}
         self._folder: tempfile.TemporaryDirectory | None = None
 
     def __enter__(self) -> "Fmu":
@@ -50,7 +58,7 @@ class Fmu:
             self.__exit__()
             raise RunError(f"{self.name}: cannot be unpacked: {one_line(error)}") from None
         try:
-            check_library(self.folder, self.description.coSimulation.modelIdentifier, self.name)
+            check_library(self.folder, self.description.coSimulation.modelIdentifier, self.name, self.fmi)
         except RunError:
             self.__exit__()
             raise
@@ -69,7 +77,7 @@ class Fmu:
 
     def outputs(self) -> list[str]:
         """Names of the Real outputs, in the order of the description."""
-        return [v.name for v in self.description.modelVariables if v.causality == "output" and v.type == "Real"]
+        return [v.name for v in self.variables.values() if v.causality == "output" and v.type == "Real"]
 
     def unit(self, name: str) -> str:
         variable = self.variables[name]
@@ -81,18 +89,21 @@ class Fmu:
         return default if value is None else float(value)
 
 
-def check_library(folder: Path, identifier: str, name: str) -> None:
+def check_library(folder: Path, identifier: str, name: str, fmi: int) -> None:
     """Refuses an unpacked FMU whose library this process cannot load: some of them would end it. Raises RunError."""
     import fmpy
 
     mine = here()
     binaries, file = folder / "binaries", identifier + mine.suffix
-    wanted = [binaries / mine.folder / file, binaries / fmpy.platform / file]
+    wanted = [
+        binaries / mine.folder_of(fmi) / file,
+        binaries / (fmpy.platform_tuple if fmi == 3 else fmpy.platform) / file,
+    ]
     path = next((path for path in wanted if path.is_file()), None)
     if path is None:
         found = sorted(each.name for each in binaries.iterdir()) if binaries.is_dir() else []
         raise RunError(
-            f"{name}: holds no library for this system (binaries/{mine.folder}/{file}); found "
+            f"{name}: holds no library for this system (binaries/{mine.folder_of(fmi)}/{file}); found "
             f"{', '.join(found) or 'none'}"
         )
     where = f"{name}: {path.relative_to(folder).as_posix()}"
@@ -119,9 +130,10 @@ class Instance:
         from fmpy.simulation import instantiate_fmu
 
         self.fmu, self.said = fmu, []
-        self.references = references([fmu.variables[name].valueReference for name in outputs])
+        self.outputs = [fmu.variables[name] for name in outputs]
 
-        def log(environment, instance, status, category, message):
+        def log(*arguments):  # of FMI 2.0: environment, instance, status, category, message; 3.0 has no instance
+            status, _, message = arguments[-3:]
             if status >= fmpy.fmi2.fmi2Error:
                 self.said.append(message.decode(errors="replace") if isinstance(message, bytes) else str(message))
 
@@ -129,6 +141,7 @@ class Instance:
             self.instance = instantiate_fmu(
                 str(fmu.folder), fmu.description, "CoSimulation", logger=log, require_functions=False
             )
+        self.access = Access3(self.instance, fmu.variables) if fmu.fmi == 3 else Access2(self.instance)
 
     @contextlib.contextmanager
     def _errors(self, what: str):
@@ -150,7 +163,7 @@ class Instance:
     def read(self, names: list[str]) -> list[float]:
         """Values of Real variables."""
         with self._errors("cannot be read"):
-            return self.instance.getReal([self.fmu.variables[name].valueReference for name in names])
+            return self._get([self.fmu.variables[name] for name in names])
 
     def blocks(
         self,
@@ -165,13 +178,10 @@ class Instance:
         inputs, time = plan.inputs, plan.start
         points = plan.points(self.fmu.description.coSimulation.canHandleVariableCommunicationStepSize)
         estimate = int(min(plan.rows, 1e15)) + 3
-        width = 8 * (1 + len(self.references))
-        block = np.empty((max(2, min(estimate, largest // width)), 1 + len(self.references)))
+        width = 8 * (1 + len(self.outputs))
+        block = np.empty((max(2, min(estimate, largest // width)), 1 + len(self.outputs)))
         given = np.empty((0, 0))
-        instance, component = self.instance, self.instance.component
-        set_real, do_step, get_real = instance.fmi2SetReal, instance.fmi2DoStep, instance.fmi2GetReal
-        outputs, n_outputs = self.references, len(self.references)
-        controls, n_controls = references(inputs.references), len(inputs.references)
+        do_step, get_outputs, n_controls = self.access.stepper(), self.access.reader(self.outputs), len(inputs.variables)
         value, value_at = moving_pointer()
         control, control_at = moving_pointer()
 
@@ -180,7 +190,8 @@ class Instance:
         value_at.value = block.ctypes.data + 8
         with self._errors(f"stopped at t = {time:g} s"):
             self._initialise(plan, start_values or {})
-            get_real(component, outputs, n_outputs, value)
+            set_inputs = self.access.writer(inputs.variables)
+            get_outputs(value)
         row = 1
         while True:
             ends = np.fromiter(itertools.islice(points, min(len(block) - row, ahead)), float)
@@ -194,10 +205,10 @@ class Instance:
             try:
                 for end in ends.tolist():
                     if n_controls:
-                        set_real(component, controls, n_controls, control)
+                        set_inputs(control)
                         control_at.value += 8 * n_controls
-                    do_step(component, time, end - time, 1)
-                    get_real(component, outputs, n_outputs, value)
+                    do_step(time, end - time)
+                    get_outputs(value)
                     value_at.value += width
                     time = end
                     if finished:
@@ -212,29 +223,22 @@ class Instance:
         if row:
             yield block[:row]
         with self._errors("cannot be terminated"):
-            instance.terminate()
+            self.instance.terminate()
 
     def _initialise(self, plan: Experiment, start_values: dict[str, float]) -> None:
         """As `simulate_fmu` does it: start values, then inputs, in initialization mode."""
-        instance = self.instance
-        instance.setupExperiment(
-            tolerance=self.fmu.experiment("tolerance", None), startTime=plan.start, stopTime=plan.stop
-        )
-        instance.enterInitializationMode()
+        self.access.start(plan.start, plan.stop, self.fmu.experiment("tolerance", None))
         if start_values:
-            instance.setReal(
-                [self.fmu.variables[name].valueReference for name in start_values], list(start_values.values())
-            )
-        if plan.inputs.references:
-            instance.setReal(plan.inputs.references, plan.inputs.at(np.array([plan.start]), after_jump=False)[0])
-        instance.exitInitializationMode()
+            self._set([self.fmu.variables[name] for name in start_values], np.array(list(start_values.values())))
+        if plan.inputs.variables:
+            self._set(plan.inputs.variables, plan.inputs.at(np.array([plan.start]), after_jump=False)[0])
+        self.instance.exitInitializationMode()
 
+    def _set(self, variables: list, values: np.ndarray) -> None:
+        values = np.ascontiguousarray(values, dtype=float)
+        self.access.writer(variables)(values.ctypes.data_as(ctypes.POINTER(ctypes.c_double)))
 
-def references(values: list[int]) -> Any:
-    return (ctypes.c_uint32 * len(values))(*values)
-
-
-def moving_pointer() -> tuple[Any, ctypes.c_size_t]:
-    """A pointer to doubles, and its address as a number that can be set: no object is made in a step."""
-    pointer = ctypes.POINTER(ctypes.c_double)()
-    return pointer, ctypes.c_size_t.from_buffer(pointer)
+    def _get(self, variables: list) -> list[float]:
+        values = np.empty(len(variables))
+        self.access.reader(variables)(values.ctypes.data_as(ctypes.POINTER(ctypes.c_double)))
+        return values.tolist()

@@ -22,7 +22,7 @@ STEPS = 500  # at least, where the caller leaves the step open
 
 def experiment(fmu: Fmu, stop_time: float | None, step: float | None, inputs: Path | None) -> Experiment:
     """What the caller leaves open filled in, as `run` says. Raises RunError."""
-    signals = read_inputs(inputs, fmu.description) if inputs is not None else None
+    signals = read_inputs(inputs, fmu.variables) if inputs is not None else None
     start = fmu.experiment("startTime", 0.0)
     if stop_time is None:
         stop_time = float(signals["time"][-1]) if signals is not None else fmu.experiment("stopTime", 1.0)
@@ -30,7 +30,7 @@ def experiment(fmu: Fmu, stop_time: float | None, step: float | None, inputs: Pa
         raise RunError(f"{inputs or fmu.name}: stop time {stop_time:g} s is not after start time {start:g} s")
     if step is None:
         step = min((stop_time - start) / STEPS, fmu.experiment("stepSize", np.inf))
-    return Experiment(start, stop_time, step, Inputs(signals, fmu.description.modelVariables))
+    return Experiment(start, stop_time, step, Inputs(signals, fmu.variables.values()))
 
 
 def run(

@@ -85,15 +85,22 @@ def limits(found: dict) -> str:
     )
 
 
-def interface(found: dict) -> str:
+def interface(found: dict, fmi: int = 2) -> str:
     """The variables, a row a kind."""
+    numbers = "Value references run over the nodes by their number, and over x, y, z."
+
+    def place(row):
+        if fmi == 3:
+            return f"{row['reference']}, {row['count']} elements"
+        return f"{row['reference']}" + (f" to {row['reference'] + row['count'] - 1}" if row["count"] > 1 else "")
+
     return first_rows(
-        "Variables of the FMU, a row a kind. Value references run over the nodes by their number, and over x, y, z.",
-        ["name", "value references", "causality", "unit", "description"],
+        f"Variables of the FMU, a row a kind. {numbers if fmi == 2 else ''}",
+        ["name", "value references" if fmi == 2 else "value reference", "causality", "unit", "description"],
         found.get("interface", []),
         lambda row: [
             row["name"],
-            f"{row['reference']}" + (f" to {row['reference'] + row['count'] - 1}" if row["count"] > 1 else ""),
+            place(row),
             *(row[key] for key in ("causality", "unit", "description")),
         ],
     )

@@ -2,7 +2,7 @@
 
 import csv
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from math import isclose
 from pathlib import Path
@@ -63,9 +63,9 @@ def read_table(path: Path, check) -> tuple[list[str], np.ndarray]:
     return header, table
 
 
-def read_inputs(path: Path, description: Any) -> np.ndarray:
-    """The input CSV as FMPy takes it: a structured array with `time` first. Raises RunError."""
-    variables = {variable.name: variable for variable in description.modelVariables}
+def read_inputs(path: Path, variables: dict[str, Any]) -> np.ndarray:
+    """The input CSV as FMPy takes it: a structured array with `time` first. variables: the FMU's, by name. Raises
+    RunError."""
     inputs = [name for name, variable in variables.items() if variable.causality == "input"]
 
     def check(header):
@@ -101,14 +101,14 @@ class Inputs:
     """Inputs linear between the rows of a table; a time given twice is a jump, before the first and after the last row
     their values hold. All by the rules, and to the bit, of FMPy's `Input`."""
 
-    def __init__(self, signals: np.ndarray | None, variables: list):
+    def __init__(self, signals: np.ndarray | None, variables: Iterable[Any]):
         """signals: of `read_inputs`; variables: the FMU's, in its order."""
         if signals is None:
             signals = np.zeros(1, dtype=[("time", float)])
         columns = set(signals.dtype.names or ())
         given = [variable for variable in variables if variable.causality == "input" and variable.name in columns]
         self.names = [variable.name for variable in given]
-        self.references = [variable.valueReference for variable in given]
+        self.variables = given
         self.time = np.ascontiguousarray(signals["time"])
         self.table = np.empty((len(self.time), len(given)))
         for column, name in enumerate(self.names):

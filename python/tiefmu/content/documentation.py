@@ -20,7 +20,12 @@ external loads. The slaves' loads times their velocities are the reactions times
 projection P. Optimized: v<sub>s</sub> = v<sub>C</sub> + w &times; d with the segment's mean rigid motion about its
 barycentre C.</li>
 <li>Outputs belong to the inputs last set: a get after a set at the same time sees the new inputs.</li>
-</ul>"""
+"""
+
+ARRAYS = """<li>Variables are arrays [n, 3] or [n]: <code>slave[j].f[k]</code> is the element of <code>slave.f</code> for the
+node <code>slave.node</code> has at the same place. Arrays of a part of the nodes have a list of their own, as
+<code>master.t.node</code>.</li>
+"""
 
 PORTS = [
     "<code>port[name]</code> of driven nodes: velocity <code>v</code> of the reference point and angular velocity "
@@ -41,12 +46,12 @@ REACTIONS = {
 }
 
 
-def page(scene: Scene, found: dict, picture: Picture) -> bytes:
-    """found: the scene's report."""
+def page(scene: Scene, found: dict, picture: Picture, fmi: int) -> bytes:
+    """found: the scene's report; fmi: 2 or 3."""
     ports = found.get("ports", [])
     small = len(picture.segments) + len(found["slaves"]) <= MOST_DRAWN
     body = [
-        paragraph(f"A tied interface as an FMI 2.0 co-simulation FMU: {summary(found)}."),
+        paragraph(f"A tied interface as an FMI {fmi}.0 co-simulation FMU: {summary(found)}."),
         *sections.remarks(found),
         picture.svg() if small else '<p><img src="../model.png" alt="the scene"></p>',
         "<h2>Ties</h2>",
@@ -56,11 +61,11 @@ def page(scene: Scene, found: dict, picture: Picture) -> bytes:
         sections.ports(found),
         "<h2>What to look at</h2>",
         *sections.worst(found),
-        CONVENTIONS,
+        CONVENTIONS + (ARRAYS if fmi == 3 else "") + "</ul>",
         "<h2>Settings</h2>",
         bullets(settings(scene, found) + (PORTS if ports else [])),
         "<h2>Variables</h2>",
-        sections.interface(found),
+        sections.interface(found, fmi),
     ]
     if found["notes"]:
         body += ["<h2>Notes</h2>", bullets([escape(line) for line in found["notes"][: sections.SHOWN]])]

@@ -29,3 +29,19 @@ def terminals(scene: Scene) -> bytes:
         parts.append("</Terminal>\n")
     parts.append("</Terminals>\n</fmiTerminalsAndIcons>\n")
     return "".join(parts).encode()
+
+
+def array_terminals(variables: list[dict]) -> bytes:
+    """Of FMI 3.0: one terminal for all masters, and so on; members are called by what follows the dot: v, f, ..."""
+    members: dict[str, list[str]] = {}
+    for row in variables:
+        owner, _, short = row["name"].partition(".")
+        if owner.removeprefix("free_").removeprefix("slave_") in ("master", "slave", "port"):
+            members.setdefault(owner, []).append(
+                f'<TerminalMemberVariable variableName="{row["name"]}" memberName="{short}" variableKind="signal"/>\n'
+            )
+    parts = ['<?xml version="1.0" encoding="UTF-8"?>\n<fmiTerminalsAndIcons fmiVersion="3.0">\n<Terminals>\n']
+    for owner, lines in sorted(members.items()):
+        parts += [f'<Terminal name="{owner}" matchingRule="plug">\n', *lines, "</Terminal>\n"]
+    parts.append("</Terminals>\n</fmiTerminalsAndIcons>\n")
+    return "".join(parts).encode()

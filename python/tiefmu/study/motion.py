@@ -63,12 +63,12 @@ class Signals:
         RunError, UsageError."""
         if path is None:
             return cls(np.zeros(1), {})
-        inputs, known = {}, []
+        inputs, known = {}, {}
         for number, block in enumerate(scene.start.variables):
             short = block["name"].removeprefix(block["prefix"] + ".")
             components = block["components"]
             for k, name in enumerate(scene.start.variable_names(number)):
-                known.append(_Variable(name, block["causality"]))
+                known[name] = _Variable(name, block["causality"])
                 owner = block["labels"] if block["prefix"] == "port" else block["ids"]
                 node = owner[k // components] if len(owner) else 0
                 inputs[name] = (
@@ -76,7 +76,7 @@ class Signals:
                     short.removesuffix("_ext"),
                     k % components,
                 )
-        table = read_inputs(path, _Description(known))
+        table = read_inputs(path, known)
         values = {}
         for name in (table.dtype.names or ())[1:]:
             node, quantity, k = inputs[name]
@@ -109,11 +109,6 @@ class _Variable:
     causality: str
     type: str = "Real"
     variability: str = "continuous"
-
-
-@dataclass
-class _Description:
-    modelVariables: list
 
 
 class Rows:

@@ -79,7 +79,7 @@ class Ready:
         if missing:
             raise UsageError(f"signals: '{missing}': no such output{suggestion(missing, known)}")
         for parameter in task.parameters:
-            settable = [v.name for v in self.fmu.description.modelVariables if v.causality in ("input", "parameter")]
+            settable = [v.name for v in self.fmu.variables.values() if v.causality in ("input", "parameter")]
             if parameter.start and parameter.start not in settable:
                 what = f"start '{parameter.start}': no input or parameter of the FMU"
                 raise UsageError(f"{what}{suggestion(parameter.start, settable)}")

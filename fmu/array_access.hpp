@@ -1,0 +1,51 @@
+// The variables of an instance as arrays of FMI 3.0.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "../modelDescription/arrays.hpp"
+#include "../modelDescription/dependencies.hpp"
+#include "instance.hpp"
+
+namespace tiefmu {
+
+class ArrayAccess {
+ public:
+  explicit ArrayAccess(Instance& instance);
+
+  // `count` arrays, whose values follow each other and must be `size` together. All throw Refused.
+  void get(const std::uint32_t references[], std::size_t count, double values[], std::size_t size);
+  void set(const std::uint32_t references[], std::size_t count, const double values[], std::size_t size);
+  void getIds(const std::uint32_t references[], std::size_t count, std::int64_t values[], std::size_t size) const;
+  void getLabels(const std::uint32_t references[], std::size_t count, const char* values[], std::size_t size) const;
+  void directionalDerivative(const std::uint32_t unknown[], std::size_t unknowns, const std::uint32_t known[],
+                             std::size_t knowns, const double seed[], std::size_t seeds, double change[],
+                             std::size_t changes);
+  void outputDerivatives(const std::uint32_t references[], std::size_t count, const int orders[], double values[],
+                         std::size_t size);
+
+  // An element depends on one of another array; elements count from 1 in C order, 0: all.
+  struct Entry {
+    std::size_t dependent;
+    std::uint32_t array;  // value reference
+    std::size_t independent;
+    Dependence kind;
+  };
+  std::vector<Entry> dependenciesOf(std::uint32_t reference);
+
+ private:
+  const Array& arrayOf(std::uint32_t reference) const;
+  const Elements& elementsOf(std::uint32_t reference, bool labels) const;
+  void spansOf(const std::uint32_t references[], std::size_t count, std::size_t size);
+  // Value references of FMI 2.0, element by element.
+  std::vector<std::uint32_t> scalars(const std::uint32_t references[], std::size_t count, std::size_t size);
+  std::string nameOf(std::uint32_t reference) const;
+
+  Instance& instance_;
+  const Arrays arrays_;
+  std::vector<Span> spans_;  // of the present call
+  std::unique_ptr<const Dependencies> dependencies_;
+};
+
+}  // namespace tiefmu
