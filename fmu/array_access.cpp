@@ -17,7 +17,8 @@ void requireArrays(const void* references, std::size_t count, const void* values
 
 }  // namespace
 
-ArrayAccess::ArrayAccess(Instance& instance) : instance_(instance), arrays_(arraysOf(instance.model(), instance.blocks())) {
+ArrayAccess::ArrayAccess(Instance& instance)
+    : instance_(instance), arrays_(arraysOf(instance.model(), instance.blocks())) {
   std::size_t most = 0;
   for (const Array& a : arrays_.arrays) most += a.spans.size();
   spans_.reserve(most);
@@ -146,9 +147,7 @@ std::vector<ArrayAccess::Entry> ArrayAccess::dependenciesOf(std::uint32_t refere
   if (!dependencies_)
     dependencies_ = std::make_unique<const Dependencies>(dependencies(instance_.model(), instance_.blocks()));
   const bool initial = instance_.state == State::instantiated || instance_.state == State::initialization;
-  const auto counts = [&](Causality c) {
-    return c == Causality::input || (initial && c == Causality::parameter);
-  };
+  const auto counts = [&](Causality c) { return c == Causality::input || (initial && c == Causality::parameter); };
   std::vector<Entry> entries;
   std::size_t element = 0;
   for (const Span& s : array.spans)

@@ -89,8 +89,8 @@ fmi3Instance fmi3InstantiateCoSimulation(fmi3String instanceName, fmi3String ins
                                          fmi3String resourcePath, fmi3Boolean /*visible*/, fmi3Boolean loggingOn,
                                          fmi3Boolean eventModeUsed, fmi3Boolean earlyReturnAllowed,
                                          const fmi3ValueReference /*requiredIntermediateVariables*/[],
-                                         size_t /*nRequiredIntermediateVariables*/,
-                                         fmi3InstanceEnvironment environment, fmi3LogMessageCallback logMessage,
+                                         size_t /*nRequiredIntermediateVariables*/, fmi3InstanceEnvironment environment,
+                                         fmi3LogMessageCallback logMessage,
                                          fmi3IntermediateUpdateCallback intermediateUpdate) {
   const auto fail = [&](const char* message) -> fmi3Instance {
     char line[2000];
@@ -207,9 +207,8 @@ fmi3Status fmi3SerializedFMUStateSize(fmi3Instance c, fmi3FMUState state, size_t
 }
 
 fmi3Status fmi3SerializeFMUState(fmi3Instance c, fmi3FMUState state, fmi3Byte bytes[], size_t size) {
-  return guard(c, call::serializeFMUState, [&](Fmi3Instance& own) {
-    own.instance.serializeState(state, reinterpret_cast<char*>(bytes), size);
-  });
+  return guard(c, call::serializeFMUState,
+               [&](Fmi3Instance& own) { own.instance.serializeState(state, reinterpret_cast<char*>(bytes), size); });
 }
 
 fmi3Status fmi3DeserializeFMUState(fmi3Instance c, const fmi3Byte bytes[], size_t size, fmi3FMUState* state) {

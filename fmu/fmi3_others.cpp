@@ -27,7 +27,8 @@ constexpr const char* onlyCoSimulation = "only co-simulation is supported";
 constexpr const char* noEvents = "there are no events and no clocks";
 constexpr const char* noStructure = "there are no structural parameters";
 
-fmi3Instance notInstantiated(fmi3LogMessageCallback log, fmi3InstanceEnvironment environment, const char* line) noexcept {
+fmi3Instance notInstantiated(fmi3LogMessageCallback log, fmi3InstanceEnvironment environment,
+                             const char* line) noexcept {
   if (log) log(environment, fmi3Error, "logStatusError", line);
   return nullptr;
 }
@@ -145,8 +146,8 @@ fmi3Status fmi3SetClock(fmi3Instance c, const fmi3ValueReference*, size_t n, con
   return noVariables(c, "fmi3SetClock", n);
 }
 
-fmi3Status fmi3GetAdjointDerivative(fmi3Instance c, const fmi3ValueReference*, size_t, const fmi3ValueReference*, size_t,
-                                    const fmi3Float64*, size_t, fmi3Float64*, size_t) {
+fmi3Status fmi3GetAdjointDerivative(fmi3Instance c, const fmi3ValueReference*, size_t, const fmi3ValueReference*,
+                                    size_t, const fmi3Float64*, size_t, fmi3Float64*, size_t) {
   return refuse(c, "fmi3GetAdjointDerivative", "adjoint derivatives are not provided");
 }
 
@@ -154,11 +155,13 @@ fmi3Status fmi3EnterConfigurationMode(fmi3Instance c) { return refuse(c, "fmi3En
 
 fmi3Status fmi3ExitConfigurationMode(fmi3Instance c) { return refuse(c, "fmi3ExitConfigurationMode", noStructure); }
 
-fmi3Status fmi3GetIntervalDecimal(fmi3Instance c, const fmi3ValueReference*, size_t, fmi3Float64*, fmi3IntervalQualifier*) {
+fmi3Status fmi3GetIntervalDecimal(fmi3Instance c, const fmi3ValueReference*, size_t, fmi3Float64*,
+                                  fmi3IntervalQualifier*) {
   return refuse(c, "fmi3GetIntervalDecimal", noEvents);
 }
 
-fmi3Status fmi3GetIntervalFraction(fmi3Instance c, const fmi3ValueReference*, size_t, fmi3UInt64*, fmi3UInt64*, fmi3IntervalQualifier*) {
+fmi3Status fmi3GetIntervalFraction(fmi3Instance c, const fmi3ValueReference*, size_t, fmi3UInt64*, fmi3UInt64*,
+                                   fmi3IntervalQualifier*) {
   return refuse(c, "fmi3GetIntervalFraction", noEvents);
 }
 
@@ -174,7 +177,8 @@ fmi3Status fmi3SetIntervalDecimal(fmi3Instance c, const fmi3ValueReference*, siz
   return refuse(c, "fmi3SetIntervalDecimal", noEvents);
 }
 
-fmi3Status fmi3SetIntervalFraction(fmi3Instance c, const fmi3ValueReference*, size_t, const fmi3UInt64*, const fmi3UInt64*) {
+fmi3Status fmi3SetIntervalFraction(fmi3Instance c, const fmi3ValueReference*, size_t, const fmi3UInt64*,
+                                   const fmi3UInt64*) {
   return refuse(c, "fmi3SetIntervalFraction", noEvents);
 }
 
@@ -182,25 +186,21 @@ fmi3Status fmi3SetShiftDecimal(fmi3Instance c, const fmi3ValueReference*, size_t
   return refuse(c, "fmi3SetShiftDecimal", noEvents);
 }
 
-fmi3Status fmi3SetShiftFraction(fmi3Instance c, const fmi3ValueReference*, size_t, const fmi3UInt64*, const fmi3UInt64*) {
+fmi3Status fmi3SetShiftFraction(fmi3Instance c, const fmi3ValueReference*, size_t, const fmi3UInt64*,
+                                const fmi3UInt64*) {
   return refuse(c, "fmi3SetShiftFraction", noEvents);
 }
 
-fmi3Status fmi3EvaluateDiscreteStates(fmi3Instance c) {
-  return refuse(c, "fmi3EvaluateDiscreteStates", noEvents);
-}
+fmi3Status fmi3EvaluateDiscreteStates(fmi3Instance c) { return refuse(c, "fmi3EvaluateDiscreteStates", noEvents); }
 
-fmi3Status fmi3UpdateDiscreteStates(fmi3Instance c, fmi3Boolean*, fmi3Boolean*, fmi3Boolean*, fmi3Boolean*, fmi3Boolean*, fmi3Float64*) {
+fmi3Status fmi3UpdateDiscreteStates(fmi3Instance c, fmi3Boolean*, fmi3Boolean*, fmi3Boolean*, fmi3Boolean*,
+                                    fmi3Boolean*, fmi3Float64*) {
   return refuse(c, "fmi3UpdateDiscreteStates", noEvents);
 }
 
-fmi3Status fmi3EnterEventMode(fmi3Instance c) {
-  return refuse(c, "fmi3EnterEventMode", noEvents);
-}
+fmi3Status fmi3EnterEventMode(fmi3Instance c) { return refuse(c, "fmi3EnterEventMode", noEvents); }
 
-fmi3Status fmi3EnterStepMode(fmi3Instance c) {
-  return refuse(c, "fmi3EnterStepMode", noEvents);
-}
+fmi3Status fmi3EnterStepMode(fmi3Instance c) { return refuse(c, "fmi3EnterStepMode", noEvents); }
 
 fmi3Status fmi3EnterContinuousTimeMode(fmi3Instance c) {
   return refuse(c, "fmi3EnterContinuousTimeMode", onlyCoSimulation);
@@ -210,9 +210,7 @@ fmi3Status fmi3CompletedIntegratorStep(fmi3Instance c, fmi3Boolean, fmi3Boolean*
   return refuse(c, "fmi3CompletedIntegratorStep", onlyCoSimulation);
 }
 
-fmi3Status fmi3SetTime(fmi3Instance c, fmi3Float64) {
-  return refuse(c, "fmi3SetTime", onlyCoSimulation);
-}
+fmi3Status fmi3SetTime(fmi3Instance c, fmi3Float64) { return refuse(c, "fmi3SetTime", onlyCoSimulation); }
 
 fmi3Status fmi3SetContinuousStates(fmi3Instance c, const fmi3Float64*, size_t) {
   return refuse(c, "fmi3SetContinuousStates", onlyCoSimulation);

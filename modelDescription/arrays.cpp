@@ -23,9 +23,8 @@ std::vector<Elements> wholeLists(const Model& model, const std::vector<Block>& b
                                  {"point.node", 0, std::move(points), {}},
                                  {"port.name", 0, {}, std::move(ports)}};
   std::erase_if(lists, [&](const Elements& e) {
-    return std::none_of(blocks.begin(), blocks.end(), [&](const Block& b) {
-      return !b.prefix.empty() && e.name.starts_with(b.prefix);
-    });
+    return std::none_of(blocks.begin(), blocks.end(),
+                        [&](const Block& b) { return !b.prefix.empty() && e.name.starts_with(b.prefix); });
   });
   return lists;
 }
@@ -37,8 +36,8 @@ std::size_t listOf(std::vector<Elements>& lists, const Array& array, std::string
       std::find_if(lists.begin(), lists.end(), [&](const Elements& e) { return e.name.starts_with(prefix); });
   if (named ? whole->labels == array.labels : whole->ids == array.ids)
     return static_cast<std::size_t>(whole - lists.begin());
-  lists.push_back({array.name + (named ? ".name" : ".node"), 0, named ? std::vector<std::int64_t>{} : array.ids,
-                   array.labels});
+  lists.push_back(
+      {array.name + (named ? ".name" : ".node"), 0, named ? std::vector<std::int64_t>{} : array.ids, array.labels});
   return lists.size() - 1;
 }
 

@@ -17,8 +17,8 @@ struct Span {
 };
 
 // Elements [n] or [n, 3] in the order of memory, C order; a scalar where it belongs to no node. Named like the scalars
-// without their number: master.v. Where driven and free nodes have arrays of the same name, inputs and outputs, the free
-// ones' is free_master.v; and slave_port.v where ports of both kinds do.
+// without their number: master.v. Where driven and free nodes have arrays of the same name, inputs and outputs, the
+// free ones' is free_master.v; and slave_port.v where ports of both kinds do.
 struct Array {
   std::string name;
   std::uint32_t reference;  // value reference of FMI 3.0, from 1: 0 is the time

@@ -261,7 +261,13 @@ struct Xml::Contents : Described {
 
  private:
   Contents(const Model& model, Simulation&& simulation, std::string n, std::string t)
-      : Described{&model, std::move(n), std::move(t), {simulation.data(), simulation.data() + simulation.layout().size}, {}, {}, {}} {
+      : Described{&model,
+                  std::move(n),
+                  std::move(t),
+                  {simulation.data(), simulation.data() + simulation.layout().size},
+                  {},
+                  {},
+                  {}} {
     simulation.initialise(0);
     experiment = defaultExperiment(model, simulation);
     blocks = variables(model, simulation.layout());

@@ -39,7 +39,8 @@ class Xml {
   Xml(const Model& model, std::string name, std::string title);
   ~Xml();
   double stepSize() const;  // of the default experiment, s
-  // guid: what the instantiation compares: GUID of FMI 2.0, instantiation token of 3.0. Large models take hundreds of megabytes: `sink` gets the text piece by piece.
+  // guid: what the instantiation compares: GUID of FMI 2.0, instantiation token of 3.0. Large models take hundreds of
+  // megabytes: `sink` gets the text piece by piece.
   void write(Standard standard, const std::string& guid, const std::function<void(std::string_view)>& sink) const;
 
  private:

@@ -60,7 +60,9 @@ def test_the_same_bits_as_simulate_fmu(fmu, tmp_path, case, stop, step):
         path = tmp_path / "in.csv"
         path.write_text(CSV[case])
     description = fmpy.read_model_description(fmu)
-    expected = of_fmpy(fmu, read_inputs(path, {v.name: v for v in description.modelVariables}) if path else None, stop, step)
+    expected = of_fmpy(
+        fmu, read_inputs(path, {v.name: v for v in description.modelVariables}) if path else None, stop, step
+    )
     found, _ = run(fmu, stop, step, path)
     assert set(found.names) == set(expected.dtype.names[1:])
     for name in ["time", *found.names]:

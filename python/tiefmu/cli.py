@@ -90,7 +90,11 @@ def parser() -> argparse.ArgumentParser:
         "in a checkout as far as `make binaries` has built them)",
     )
     build.add_argument(
-        "--fmi", type=int, choices=(2, 3), default=2, help="version of the standard (default: 2); 3 has arrays for large ties"
+        "--fmi",
+        type=int,
+        choices=(2, 3),
+        default=2,
+        help="version of the standard (default: 2); 3 has arrays for large ties",
     )
     build.set_defaults(command=run_build)
 

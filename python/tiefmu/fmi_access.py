@@ -70,7 +70,7 @@ class Access3:
         return read
 
     def writer(self, variables: list) -> Transfer:
-        call, size, places = self._call(self.instance.fmi3SetFloat64, variables)
+        call, _, places = self._call(self.instance.fmi3SetFloat64, variables)
         if places is None:
             return call
         arrays = [self._values[reference] for reference in dict.fromkeys(v.valueReference for v in variables)]
@@ -112,7 +112,7 @@ def references(variables: list) -> Any:
 
 def view(pointer: Any, count: int) -> np.ndarray:
     """The doubles at a pointer, which may move afterwards."""
-    return np.frombuffer((ctypes.c_double * count).from_address(ctypes.addressof(pointer.contents)))
+    return np.ctypeslib.as_array((ctypes.c_double * count).from_address(ctypes.addressof(pointer.contents)))
 
 
 def moving_pointer() -> tuple[Any, ctypes.c_size_t]:

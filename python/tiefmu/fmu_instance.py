@@ -37,8 +37,8 @@ class Fmu:
             self.description = fmpy.read_model_description(str(path), validate=False)
         except Exception as error:
             raise RunError(f"{self.name}: not an FMU that FMPy can read: {one_line(error)}") from None
-        self.fmi = {"2.0": 2, "3.0": 3}.get(self.description.fmiVersion)
-        if self.fmi is None or self.description.coSimulation is None:
+        self.fmi = {"2.0": 2, "3.0": 3}.get(self.description.fmiVersion, 0)
+        if not self.fmi or self.description.coSimulation is None:
             raise RunError(f"{self.name}: not an FMU for co-simulation by FMI 2.0 or 3.0")
         variables = self.description.modelVariables
         if self.fmi == 3:
@@ -181,7 +181,11 @@ class Instance:
         width = 8 * (1 + len(self.outputs))
         block = np.empty((max(2, min(estimate, largest // width)), 1 + len(self.outputs)))
         given = np.empty((0, 0))
-        do_step, get_outputs, n_controls = self.access.stepper(), self.access.reader(self.outputs), len(inputs.variables)
+        do_step, get_outputs, n_controls = (
+            self.access.stepper(),
+            self.access.reader(self.outputs),
+            len(inputs.variables),
+        )
         value, value_at = moving_pointer()
         control, control_at = moving_pointer()
 

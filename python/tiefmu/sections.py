@@ -98,11 +98,7 @@ def interface(found: dict, fmi: int = 2) -> str:
         f"Variables of the FMU, a row a kind. {numbers if fmi == 2 else ''}",
         ["name", "value references" if fmi == 2 else "value reference", "causality", "unit", "description"],
         found.get("interface", []),
-        lambda row: [
-            row["name"],
-            place(row),
-            *(row[key] for key in ("causality", "unit", "description")),
-        ],
+        lambda row: [row["name"], place(row), *(row[key] for key in ("causality", "unit", "description"))],
     )
 
 

@@ -21,7 +21,9 @@ def content(scene: Scene, found: dict, step: float, fmi: int) -> dict[str, bytes
     files = {
         "documentation/index.html": page(scene, found, picture, fmi),
         "model.png": picture.png(),
-        "terminalsAndIcons/terminalsAndIcons.xml": terminals(scene) if fmi == 2 else array_terminals(found["interface"]),
+        "terminalsAndIcons/terminalsAndIcons.xml": terminals(scene)
+        if fmi == 2
+        else array_terminals(found["interface"]),
     }
     files |= {f"documentation/licenses/{path.name}": path.read_bytes() for path in LICENSES.glob("*.txt")}
     files["documentation/licenses/tiefmu.txt"] = own_license().encode()

@@ -22,8 +22,8 @@ barycentre C.</li>
 <li>Outputs belong to the inputs last set: a get after a set at the same time sees the new inputs.</li>
 """
 
-ARRAYS = """<li>Variables are arrays [n, 3] or [n]: <code>slave[j].f[k]</code> is the element of <code>slave.f</code> for the
-node <code>slave.node</code> has at the same place. Arrays of a part of the nodes have a list of their own, as
+ARRAYS = """<li>Variables are arrays, [n, 3] for vectors: row k of <code>slave.f</code> belongs to the node whose id
+stands at place k of <code>slave.node</code>. Arrays of a part of the nodes have a list of their own:
 <code>master.t.node</code>.</li>
 """
 
