@@ -12,6 +12,13 @@ import tiefmu
 from tiefmu.fmi3_variables import elements
 from tiefmu.platforms import here
 
+
+def functions() -> set[str]:
+    """Of the standard, by its header."""
+    header = (Path(fmpy.__file__).parent / "c-code" / "fmi3Functions.h").read_text()
+    return {line.split("FullName(")[1].split(")")[0] for line in header.splitlines() if "FullName(fmi3" in line}
+
+
 OK, WARNING, DISCARD, ERROR, FATAL = range(5)
 LogMessage = ctypes.CFUNCTYPE(None, c_void_p, c_int, c_char_p, c_char_p)
 Update = ctypes.CFUNCTYPE(

@@ -12,6 +12,7 @@ import subprocess
 import zipfile
 from pathlib import Path
 
+import fmi3_calls
 import numpy as np
 import pytest
 import tiefmu
@@ -231,4 +232,5 @@ def darwin(data: bytes):
 
 def shows(names):
     names = set(names)
-    assert not [name for name in names if not name.startswith("fmi2")] and len(names) == 44
+    assert not [name for name in names if not name.startswith(("fmi2", "fmi3"))]
+    assert len(names) == 44 + len(fmi3_calls.functions())

@@ -7,6 +7,7 @@ import struct
 from ctypes import byref, c_char_p, c_double, c_int, c_size_t, c_uint, c_void_p
 from urllib.parse import quote
 
+import fmi3_calls
 import numpy as np
 import pytest
 from fmu_calls import DISCARD, ERROR, MODEL_EXCHANGE, OK, Instance, diverged
@@ -68,8 +69,8 @@ def elf_exports(data: bytes) -> set[str]:
     return found
 
 
-def test_the_library_shows_the_functions_of_the_standard_and_nothing_else(fmu):
-    expected = {"fmi2" + name for name in COMMON + CO_SIMULATION + MODEL_EXCHANGE}
+def test_the_library_shows_the_functions_of_the_standards_and_nothing_else(fmu):
+    expected = {"fmi2" + name for name in COMMON + CO_SIMULATION + MODEL_EXCHANGE} | fmi3_calls.functions()
     data = fmu.binary.read_bytes()
     if data[:4] == b"\x7fELF":
         assert elf_exports(data) == expected

@@ -177,7 +177,8 @@ def run_build(options: argparse.Namespace) -> None:
             file=sys.stderr,
         )
     systems = ", ".join(library.text for library in libraries(options.platforms))
-    print(f"{fmu}: {summary(found)}, {fmu.stat().st_size / 1024:.0f} KiB, for {systems}")
+    arrays = " as arrays" if options.fmi == 3 else ""
+    print(f"{fmu}: {summary(found)}{arrays}, {fmu.stat().st_size / 1024:.0f} KiB, for {systems}")
     if found["lumping"]:
         print(lumping_line(found["lumping"]))
     if found["notes"]:
