@@ -212,22 +212,22 @@ def test_inputs_may_follow_the_substeps(free):
 
     def load(instance, time, _):
         times.append(time)
-        assert instance.set({"slave.f": (1 + 1e3 * time) * force}) == OK
+        assert instance.set({"slave.f": (1 + 0.1 * time) * force}) == OK
         instance.get(*outputs)
         assert instance.call("Terminate") == ERROR  # not in the middle of a step
 
     probe = Instance(free).start()
-    step = 10.5 * probe.get("stable_time_step")[0]
+    step = 2.5 * probe.get("stable_time_step")[0]
     asked = Instance(free, update=load).start()
     assert asked.set({"slave.f": force}) == OK
     assert asked.step(0.0, step) == (OK, False, step)
-    assert len(times) >= 10
+    assert len(times) >= 2
     assert (np.diff([0.0, *times, step]) > 0).all()
     single = Instance(free).start()
     assert single.set({"slave.f": force}) == OK
     for begin, end in zip([0.0, *times], [*times, step]):
         if begin:
-            assert single.set({"slave.f": (1 + 1e3 * begin) * force}) == OK
+            assert single.set({"slave.f": (1 + 0.1 * begin) * force}) == OK
         assert single.step(begin, end - begin)[0] == OK
     np.testing.assert_allclose(asked.get(*outputs), single.get(*outputs), rtol=1e-12, atol=1e-12)
     for instance in (probe, asked, single):
@@ -243,7 +243,7 @@ def test_a_step_may_end_early(free):
         return time if len(ends) == 3 else None
 
     instance = Instance(free, update=stop, early=True).start()
-    step = 10 * instance.get("stable_time_step")[0]
+    step = 4 * instance.get("stable_time_step")[0]
     assert instance.step(0.0, step) == (OK, True, ends[2])
     assert instance.get("time") == [ends[2]]
     assert instance.step(ends[2], 1e-3 * step)[0] == OK

@@ -10,8 +10,9 @@ from dataclasses import dataclass
 @dataclass(frozen=True)
 class Platform:
     """folder: below binaries/ (FMI 2.0.4, section 2.3: Linux and Windows on x86-64 have names of their own, `darwin64`
-    is macOS on x86-64, all others are named by the platform tuples of FMI 3.0, which has no others). targets: zig's names of the system; of
-    several, for one file that holds the library for each. kept: where that file is kept, folder of build/binaries."""
+    is macOS on x86-64, all others are named by the platform tuples of FMI 3.0, which has no others). targets: zig's
+    names of the system; of several, for one file that holds the library for each. kept: where that file is kept, folder
+    of build/binaries."""
 
     folder: str
     suffix: str
