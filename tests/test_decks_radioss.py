@@ -195,6 +195,15 @@ def test_units_of_the_deck_by_name(tmp_path):
     )
 
 
+def test_a_deck_in_small_letters_behind_a_byte_order_mark(tmp_path):
+    made = deck().text()
+    small = "\ufeff" + "\n".join(line if line.startswith("#") else line.lower() for line in made.split("\n"))
+    (tmp_path / "deck_0000.rad").write_text(small, encoding="utf-8")
+    found = decks.read(tmp_path / "deck_0000.rad")
+    assert len(found.scene.node_id) == 5
+    assert not found.deck.warnings
+
+
 def test_an_include_with_a_head_of_its_own(tmp_path):
     """HyperCrash writes #RADIOSS STARTER, /BEGIN and /END into includes."""
     text = "\n".join(deck().lines)

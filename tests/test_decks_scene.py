@@ -10,6 +10,7 @@ import pytest
 import tiefmu
 from deck_cards import RadiossDeck
 from tiefmu import decks
+from tiefmu.cli import main
 from tiefmu.package import build
 from tiefmu.report import report
 
@@ -354,3 +355,40 @@ def test_decks_of_the_repository_run_in_fmpy(tmp_path, path):
     run_in_fmpy(path, tmp_path)
     if path.suffix != ".inp":  # whose parts have names
         run_in_fmpy(path, tmp_path, free=("1", "2"))
+
+
+# what weighs or holds nothing
+
+
+@pytest.mark.parametrize(
+    "change, word",
+    [
+        ({"thickness": 0.0}, "have no thickness; they add no mass and no stiffness"),
+        ({"density": 0.0}, "have a material without density; they add no mass"),
+        ({"young": 0.0}, "have a material without Young's modulus; they add no stiffness"),
+    ],
+)
+def test_shells_that_weigh_or_hold_nothing_are_named(tmp_path, change, word):
+    """A card in a wrong place reads as 0. A triangle too, whose formulas divide by the modulus."""
+    made = RadiossDeck().nodes(PLATE | PIN | {5: (3, 0, 0)})
+    made.elastic(**{key: value for key, value in change.items() if key != "thickness"})
+    made.shell(thickness=change.get("thickness", 1e-3)).part()
+    made.elements("SHELL", 1, {1: (1, 2, 3, 4)}).elements("SH3N", 1, {2: (2, 5, 3)})
+    made.node_group(1, [11]).surface(1, "PART", [1]).tie(1, 1, 1, 0, 1, 0, 0.5)
+    found = read(made.block("/ADMAS/5/1", (0.5, 11), title="pin"), tmp_path)
+    assert any("/PART/1: part 1: 1 elements at the ties " + word in line for line in found.deck.warnings)
+
+
+def test_a_beam_without_cross_section_is_named(tmp_path):
+    made = deck().block("/PROP/TYPE3/2", (0,), (0.0, 0.0), (0.0, 1e-9, 1e-9, 2e-9), title="rod").part(2, 2, 1)
+    found = read(made.elements("BEAM", 2, {5: (11, 12, 1)}), tmp_path)
+    assert any("part 2: 1 elements at the ties have no cross-section" in line for line in found.deck.warnings)
+
+
+def test_the_import_says_which_slaves_find_nothing(tmp_path, capsys):
+    made = deck().node_group(7, [11, 12], "two").tie(2, 7, 1, 1, 1, 0, 0.2, "other")
+    file, scene = made.write(tmp_path / "deck_0000.rad"), tmp_path / "scene.toml"
+    assert main(["import", str(file), "--tie", "other", "-o", str(scene)]) == 0
+    line = "tie 'other': slave 12: no segment found within search_distance 0.2"
+    assert line in capsys.readouterr().err
+    assert f"deck_0000.rad: {line}"[:60] in " ".join(scene.read_text().split("\n#   "))

@@ -349,3 +349,17 @@ def test_slaves_of_their_own_surface_are_passed_over(tmp_path):
     found = read(default_tie().node_group(1, [5, 21]).tie(1, 1, 1), tmp_path)
     assert found.scene.node_sets["weld slaves"].tolist() == [21]
     assert any("1 slaves, the first is node 5, belong to its own surface" in line for line in found.deck.warnings)
+
+
+def test_a_tie_that_keeps_no_slave_is_left_out(tmp_path):
+    """One whose slaves are all of another tie, and one that finds nothing within its tolerance: the others stay."""
+    shared = two_ties().tie(3, 1, 1, title="once more")
+    found = read(shared, tmp_path)
+    assert [tie["name"] for tie in found.scene.tables["tie"]] == ["left weld", "right weld"]
+    assert any("tie 'once more': every slave belongs to another tie" in line for line in found.deck.warnings)
+    far = two_ties().nodes({31: (0.5, 0.5, 0.3)}).node_group(3, [31]).tie(3, 3, 1, 2, title="far")
+    found = read(far.block("/ADMAS/5/2", (0.5, 31), title="far"), tmp_path)
+    assert [tie["name"] for tie in found.scene.tables["tie"]] == ["left weld", "right weld"]
+    assert set(found.scene.node_sets) == {"left weld slaves", "right weld slaves"}
+    assert any("tie 'far': none of its slaves is left" in line for line in found.deck.warnings)
+    decks.compiled(found)

@@ -7,6 +7,7 @@ segment; write.py puts it into files.
 
 import dataclasses
 import tempfile
+from codecs import BOM_UTF8
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,6 +18,7 @@ from .. import schema
 from .._core import SceneError
 from ..arguments import check_folder_of
 from ..errors import UsageError
+from ..report import of_each_kind
 from ..scene import Scene, one_line
 from . import abaqus, dyna, radioss, to_scene, write
 from .model import Deck
@@ -40,7 +42,7 @@ def language(path: Path):
     if path.suffix.lower() in NOT_DECKS or not path.is_file():
         return None
     with path.open("rb") as file:
-        head = file.read(HEAD)
+        head = file.read(HEAD).removeprefix(BOM_UTF8)
     return next((one for one in LANGUAGES if one.recognises(path, head)), None)
 
 
@@ -56,7 +58,7 @@ def read(path: Path, ties: list[str] | None = None, free: tuple[str, ...] = ()) 
     masters the FMU moves itself. SceneError, one line "FILE: line N: /KEYWORD: message", on what is wrong; UsageError
     where there is no deck."""
     if not path.is_file():
-        raise UsageError(f"{path}: no such file")
+        raise UsageError(f"{path}: {'is a folder' if path.is_dir() else 'no such file'}")
     reader = language(path)
     if reader is None:
         raise UsageError(
@@ -160,6 +162,8 @@ def import_deck(deck: Path, scene: Path, ties: list[str] | None = None, free: tu
     """Writes the scene of a deck: `scene` and, beside it, its mesh and its node properties."""
     check_folder_of(scene)
     found = read(deck, ties, free)
-    compiled(found)  # what cannot be built is not written
+    made = compiled(found)  # what cannot be built is not written
+    for line in of_each_kind(made.model.report()["warnings"], 10, f": tiefmu info {scene} --json"):
+        found.deck.warn(f"{found.deck.file}: {line}")
     write.scene(found, scene)
     return found

@@ -11,7 +11,8 @@ class Choice:
 
     def __init__(self, deck: Deck, keyword: str, wanted: list[str] | None):
         self.deck, self.keyword = deck, keyword
-        self.asked = [name.strip().lower() for name in wanted] if wanted else None
+        self.typed = {name.strip().lower(): name.strip() for name in wanted or []}
+        self.asked = list(self.typed) if wanted else None
         self.known: list[str] = []
         self.found: set[str] = set()
 
@@ -39,6 +40,6 @@ class Choice:
             names = [name for name in self.known if close and name.lower() == close[0]]
             known = ", ".join(self.known[:8])
             hint = f"; did you mean '{names[0]}'?" if names else f"; it has: {known}" if known else ""
-            raise SceneError(f"{where}: no tie is called '{missing[0]}'{hint}")
+            raise SceneError(f"{where}: no tie is called '{self.typed[missing[0]]}'{hint}")
         if not self.deck.ties:
             raise SceneError(f"{where}: the deck has no tie")

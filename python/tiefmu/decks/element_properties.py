@@ -110,6 +110,33 @@ def nodal(deck: Deck, in_scene: dict[str, np.ndarray] | None = None) -> Nodal:
     return found
 
 
+def warn_of_nothing(deck: Deck, used: np.ndarray):
+    """Elements at nodes of the scene that weigh or hold nothing, as a card out of its place makes them. used: nodes."""
+    for kind, elements in deck.elements.items():
+        near = (used[elements.nodes] & (elements.nodes >= 0)).any(axis=1)
+        flat = kind.startswith(("shell", "membrane"))
+        thin = flat and deck.thickness(elements) <= 0
+        for part, prop, material, members in deck.part_values(elements.part):
+            members = members[near[members]]
+            if not len(members) or prop is None or prop.kind in ("void", "other", "spring"):
+                continue
+            if material is None or material.void:
+                continue
+            said = any(line.startswith(f"{material.where}: ") for line in deck.warnings)
+            bare = int(np.sum(thin[members])) if flat else 0
+            if bare:
+                count, lack = bare, "have no thickness; they add no mass and no stiffness"
+            elif kind in ("truss", "beam") and not prop.values.get("area"):
+                count, lack = len(members), "have no cross-section; they add no mass and no stiffness"
+            elif not material.density and not said:
+                count, lack = len(members), "have a material without density; they add no mass"
+            elif not material.young and not said:
+                count, lack = len(members), "have a material without Young's modulus; they add no stiffness"
+            else:
+                continue
+            deck.warn(f"{part.where or deck.file}: {part.name}: {count} elements at the ties {lack}")
+
+
 def structural_mass(deck: Deck, parts: set[int]) -> np.ndarray:
     """Mass that the elements of some parts give to the nodes of the deck."""
     wanted = np.array(sorted(parts), np.int64)
@@ -192,6 +219,8 @@ def shell3(found: Nodal, deck: Deck, some: Elements, part, prop, material, where
         return
     if turning:
         found.rotations[some.nodes] = True
+    if not material.young:
+        return
     v = damping_factor(prop, material)
     a11 = material.young / (1 - material.poisson**2)
     longest = side.max(axis=1) ** 2

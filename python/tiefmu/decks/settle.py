@@ -50,7 +50,12 @@ def drop(deck: Deck, written: Written, name: str, kept: np.ndarray):
             "their tolerance and are dropped"
         )
     if not len(kept):
-        raise SceneError(f"{deck.file}: tie '{name}': no slave is within its tolerance of the surface")
+        if len(written.tables["tie"]) == 1:
+            raise SceneError(f"{deck.file}: tie '{name}': no slave is within its tolerance of the surface")
+        deck.warn(f"tie '{name}': none of its slaves is left; it is left out")
+        written.tables["tie"].remove(table)
+        del written.node_sets[table["slaves"]], written.segment_sets[table["segments"]]
+        return
     written.node_sets[table["slaves"]] = np.sort(kept)
 
 

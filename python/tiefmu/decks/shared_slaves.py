@@ -2,7 +2,6 @@
 
 import numpy as np
 
-from .._core import SceneError
 from .model import Deck
 
 
@@ -29,7 +28,8 @@ def settle_shared(deck: Deck):
                 f"slaves of tie '{owner.name}' or another too and stay with the nearer surface"
             )
             if not len(tie.slaves):
-                raise SceneError(f"{tie.where}: tie '{tie.name}': every slave belongs to another tie")
+                deck.warn(f"{tie.where}: tie '{tie.name}': every slave belongs to another tie; it is left out")
+    deck.ties = [tie for tie in deck.ties if len(tie.slaves)]
 
 
 def corners(deck: Deck, faces: np.ndarray) -> np.ndarray:

@@ -13,7 +13,7 @@ import numpy as np
 
 from .._core import SceneError
 from ..units import DIMENSIONS, LENGTHS, MASSES, TIMES
-from .element_properties import Nodal, nodal
+from .element_properties import Nodal, nodal, warn_of_nothing
 from .model import TURNING, Deck, Faces, Tie
 from .shared_slaves import settle_shared
 from .springs import held_by_scene, spring_tables
@@ -52,6 +52,7 @@ def convert(deck: Deck, free: tuple[str, ...] = ()) -> Written:
     loose = free_nodes(deck, free)
     held = hold(deck, slave, master, loose)
     in_scene = held_by_scene(deck, slave, master | slave, loose & ~held["fixed"])
+    warn_of_nothing(deck, slave | master)
     values = nodal(deck, in_scene)
     drop_rotations(deck, values, slave)
     springs, ends = spring_tables(deck, in_scene, values.rotations)

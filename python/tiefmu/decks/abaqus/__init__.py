@@ -5,7 +5,6 @@ The mesh is read by mesh/abaqus.py, as for scenes; docs/decks_abaqus.md lists th
 
 import mmap
 import re
-from codecs import BOM_UTF8 as BOM
 from pathlib import Path
 
 import numpy as np
@@ -25,7 +24,7 @@ CALCULIX = {"NODEFILE", "ELFILE", "CONTACTFILE", "FACEPRINT", "SECTIONPRINT"}
 
 def recognises(path: Path, head: bytes) -> bool:
     """Whether the file is an input file with ties, or with includes where they may be: a mesh alone is no deck."""
-    lines = map(bytes.strip, head.removeprefix(BOM).split(b"\n"))
+    lines = map(bytes.strip, head.split(b"\n"))
     first = next((line for line in lines if line and line[:2] != b"**"), b"")
     if first[:1] != b"*" or first[:8].upper() == b"*KEYWORD":
         return False

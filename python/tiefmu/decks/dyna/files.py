@@ -2,6 +2,7 @@
 
 import dataclasses
 import re
+from codecs import BOM_UTF8
 from pathlib import Path, PureWindowsPath
 
 from ..._core import SceneError
@@ -35,7 +36,7 @@ class Reader:
             raise SceneError(f"{name}: too many includes")
         self.open.append(path.resolve())
         scope = parameters.Scope(parent)
-        data = path.read_bytes()
+        data = path.read_bytes().removeprefix(BOM_UTF8)
         block: Block | None = None
         for number, line in enumerate(data.split(b"\n"), 1):
             first = line[:1]

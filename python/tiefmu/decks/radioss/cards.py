@@ -5,6 +5,7 @@ wide and reals 20 wide, in formats before 5.1 8 and 16 wide; the title of a bloc
 its first card since.
 """
 
+from codecs import BOM_UTF8
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -246,7 +247,7 @@ class Reader:
             raise SceneError(f"{name}: more than {MOST_INCLUDES} includes")
         self.open.append(path.resolve())
         self.source.files.append(name)
-        data = path.read_bytes()
+        data = path.read_bytes().removeprefix(BOM_UTF8)
         if self.block is not None:
             self.block.files.append((len(self.block.lines), name))
         for number, line in enumerate(data.split(b"\n"), 1):
@@ -257,7 +258,7 @@ class Reader:
                 elif line.strip().lower() in (b"#enddata", b"#end"):
                     break
             elif first == b"/":
-                if line[:5].strip() == b"/END":
+                if line[:5].strip().upper() == b"/END":
                     break
                 self.keyword(name, number, line)
             elif self.block is not None:
