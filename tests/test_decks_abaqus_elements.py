@@ -393,3 +393,14 @@ def test_masses_of_nodes_are_masses_of_elements(tmp_path):
             slopes = np.stack([signs[:, a] * f[:, (a + 1) % 3] * f[:, (a + 2) % 3] for a in range(3)]) / 8
             total += RHO * weight[i] * weight[j] * weight[k] * np.linalg.det(slopes @ p)
     assert sum(one["m"] for one in found.values()) == pytest.approx(total, rel=1e-12)
+
+
+def test_masses_without_value_and_elements_of_two_sections_are_named(tmp_path):
+    deck = shells("S4R", {1: (1, 2, 3, 4)}).elements("MASS", "lumps", {7: (1,), 8: (2,)})
+    deck.elements("ROTARYI", "turns", {9: (1,)}).block("NSET, NSET=x", "1")
+    deck.block("ELSET, ELSET=one", "7").block("MASS, ELSET=one", (0.5,)).shell("e", 0.2)
+    said: list[str] = []
+    read(deck, tmp_path, SQUARE, said)
+    assert any("1 elements of type MASS, the first is 8, have no mass given" in line for line in said)
+    assert any("1 elements of type ROTARYI, the first is 9, have no inertia given" in line for line in said)
+    assert any("1 of its elements have a section already, in " in line for line in said)

@@ -115,7 +115,7 @@ def warn_of_nothing(deck: Deck, used: np.ndarray):
     for kind, elements in deck.elements.items():
         near = (used[elements.nodes] & (elements.nodes >= 0)).any(axis=1)
         flat = kind.startswith(("shell", "membrane"))
-        thin = flat and deck.thickness(elements) <= 0
+        thin = deck.thickness(elements) <= 0
         for part, prop, material, members in deck.part_values(elements.part):
             members = members[near[members]]
             if not len(members) or prop is None or prop.kind in ("void", "other", "spring"):

@@ -18,9 +18,11 @@ NAMED = {
 
 def masses(source: Source):
     deck = source.deck
+    given: dict[str, list[np.ndarray]] = {}
     for scope, block in source.cards("MASS", "ROTARYINERTIA"):
         rows = source.rows(scope, block.need("ELSET"), block)
         nodes = nodes_of_rows(source, rows)
+        given.setdefault(block.key, []).append(rows)
         values = block.data()
         if not values:
             block.fail("has no data")
@@ -38,6 +40,17 @@ def masses(source: Source):
             block.fail(f"{value:g} is no mass", 0)
         for node in nodes:  # one element each; several may share a node
             target.append((np.array([node]), value))
+    for first, block, card in zip(source.assembly.first_row, source.assembly.blocks, source.assembly.cards):
+        key = {"MASS": "MASS", "ROTARYI": "ROTARYINERTIA"}.get(card.get("TYPE").upper())
+        if key is None:
+            continue
+        lone = np.setdiff1d(first + np.arange(len(block.ids)), np.concatenate(given.get(key, [[]])))
+        if len(lone):
+            word = "mass" if key == "MASS" else "inertia"
+            deck.warn(
+                f"{card.where}: {len(lone)} elements of type {card.get('TYPE').upper()}, the first is "
+                f"{source.element_id[int(lone[0])]}, have no {word} given"
+            )
 
 
 def boundaries(source: Source):

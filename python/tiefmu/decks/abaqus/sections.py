@@ -46,6 +46,13 @@ class Sections:
         for scope, block in source.cards(*SECTIONS):
             name = block.need("ELSET")
             rows = source.rows(scope, name, block)
+            taken = self.section_of_row[rows]
+            if (taken >= 0).any():
+                other = self.sections[taken[taken >= 0][0]].block.where
+                self.deck.warn(
+                    f"{block.where}: set '{name}': {(taken >= 0).sum()} of its elements have a section already, in "
+                    f"{other}; this one counts"
+                )
             self.section_of_row[rows] = len(self.sections)
             whole = f"{scope.name}.{name}" if scope.name else name
             self.sections.append(Section(block, scope, whole))
