@@ -12,7 +12,8 @@ from pathlib import Path
 import fmpy
 import numpy as np
 import tiefmu
-from tiefmu.fmu_instance import Fmu, Instance, moving_pointer, references
+from tiefmu.fmi_access import moving_pointer, references
+from tiefmu.fmu_instance import Fmu, Instance
 from tiefmu.run import experiment, simulate
 from tiefmu.signals import read_inputs
 
@@ -27,19 +28,19 @@ def bare(fmu, plan, outputs) -> float:
     loaded._initialise(plan, {})
     rows = np.empty((STEPS + 1, len(outputs)))
     given = plan.inputs.at(plan.start + plan.step * np.arange(STEPS))
-    n, m = len(outputs), len(plan.inputs.references)
+    n, m = len(outputs), len(plan.inputs.variables)
     row, row_at = moving_pointer()
     control, control_at = moving_pointer()
     row_at.value, control_at.value = rows.ctypes.data, given.ctypes.data
-    controls = references(plan.inputs.references)
+    controls, wanted = references(plan.inputs.variables), references(loaded.outputs)
     began = time.perf_counter()
-    instance.fmi2GetReal(instance.component, loaded.references, n, row)
+    instance.fmi2GetReal(instance.component, wanted, n, row)
     for k in range(STEPS):
         instance.fmi2SetReal(instance.component, controls, m, control)
         instance.fmi2DoStep(instance.component, plan.start + k * plan.step, plan.step, 1)
         row_at.value += 8 * n
         control_at.value += 8 * m
-        instance.fmi2GetReal(instance.component, loaded.references, n, row)
+        instance.fmi2GetReal(instance.component, wanted, n, row)
     seconds = time.perf_counter() - began
     instance.terminate()
     loaded.free()
