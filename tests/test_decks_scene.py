@@ -392,3 +392,24 @@ def test_the_import_says_which_slaves_find_nothing(tmp_path, capsys):
     line = "tie 'other': slave 12: no segment found within search_distance 0.2"
     assert line in capsys.readouterr().err
     assert f"deck_0000.rad: {line}"[:60] in " ".join(scene.read_text().split("\n#   "))
+
+
+def test_springs_and_masses_that_cannot_be_are_refused_by_element_and_node(tmp_path):
+    def refused(made):
+        with pytest.raises(tiefmu.SceneError) as error:
+            decks.compiled(read(made, tmp_path))
+        return str(error.value)
+
+    def springs(kind, k, nodes, moved=None):
+        made = deck().nodes(moved or {}).spring(2, kind=kind, k=k).part(2, 2, 0)
+        return made.elements("SPRING", 2, {5: nodes})
+
+    where = "/PROP/TYPE{}/2: element 5: "
+    assert where.format(13) + "both of its ends are node 11" in refused(springs(13, [1.0] * 6, (11, 11)))
+    assert where.format(13) + "a stiffness or damping of -3 is negative" in refused(
+        springs(13, [1.0, -3.0, 1.0, 1.0, 1.0, 1.0], (11, 12))
+    )
+    same = springs(4, [3.0], (11, 14), {14: PIN[11]})
+    assert where.format(4) + "its nodes 11 and 14 are at one place" in refused(same)
+    light = deck().block("/ADMAS/5/2", (-0.7, 11), title="wrong sign")
+    assert "deck_0000.rad: node 11: its mass would be -0.2" in refused(light)

@@ -146,9 +146,9 @@ def tables(path: Path, folder: Path) -> dict:
 def compiled(found: Imported, expose: Sequence[str] = ()) -> Scene:
     path = Path(found.deck.file)
     with tempfile.TemporaryDirectory(prefix="tiefmu-") as folder:
-        made = schema.parse(write.files(found, Path(folder), path.stem, to_keep=False))
-        made.interface.expose += expose
         try:
+            made = schema.parse(write.files(found, Path(folder), path.stem, to_keep=False))
+            made.interface.expose += expose
             scene = Scene(found.deck.file, path.stem, made, Path(folder))
         except SceneError as error:
             raise SceneError(one_line(f"{found.deck.file}: {error}")) from None

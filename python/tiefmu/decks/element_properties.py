@@ -104,6 +104,11 @@ def nodal(deck: Deck, in_scene: dict[str, np.ndarray] | None = None) -> Nodal:
     found.limp = False
     for nodes, mass in deck.added_mass:
         np.add.at(found.mass, nodes, mass)
+    if found.mass.min(initial=0.0) < 0:
+        node = int(np.argmin(found.mass))
+        raise SceneError(
+            f"{deck.file}: node {deck.node_id[node]}: its mass would be {found.mass[node]:g}, as a mass is negative"
+        )
     for nodes, inertia in deck.added_inertia:
         np.add.at(found.inertia, nodes, inertia)
         found.rotations[nodes] = True

@@ -8,6 +8,7 @@ from collections import Counter
 
 import numpy as np
 
+from .._core import SceneError
 from .beams import beam_stiffness
 from .model import Deck
 
@@ -72,6 +73,7 @@ def spring_tables(deck: Deck, held: dict[str, np.ndarray], turns: np.ndarray) ->
                 values = prop.values
                 if kind != "spring":
                     values = as_spring(deck, kind, prop, material, elements, index)
+                refuse_spring(deck, f"{prop.where}: element {elements.id[index]}", values, a, b)
                 made, lost = tables_of(deck, values, prop.where, a, b, turns)
                 if lost:
                     pinned[prop.where] += 1
@@ -94,6 +96,16 @@ def spring_tables(deck: Deck, held: dict[str, np.ndarray], turns: np.ndarray) ->
             "left out"
         )
     return tables, np.unique(np.array(ends, np.int64))
+
+
+def refuse_spring(deck: Deck, where: str, values: dict, a: int, b: int):
+    if a == b:
+        raise SceneError(f"{where}: both of its ends are node {deck.node_id[a]}")
+    if values["type"] == "axial" and b >= 0 and (deck.position[a] == deck.position[b]).all():
+        raise SceneError(f"{where}: its nodes {deck.node_id[a]} and {deck.node_id[b]} are at one place: it has no axis")
+    least = min(float(np.min(values[key])) for key in NAMES)
+    if least < 0:
+        raise SceneError(f"{where}: a stiffness or damping of {least:g} is negative")
 
 
 def as_spring(deck: Deck, kind: str, prop, material, elements, index: int) -> dict:
