@@ -98,20 +98,13 @@ void appendHead(std::string& out, const std::string& name, const std::string& ti
 }
 
 void appendDefinitions(std::string& out) {
-  out += "<UnitDefinitions>\n";
-  for (const UnitRow& u : units) out += std::string("<Unit name=\"") + u.name + "\"><BaseUnit" + u.base + "/></Unit>\n";
-  out += "</UnitDefinitions>\n<TypeDefinitions>\n";
+  appendUnits(out);
+  out += "<TypeDefinitions>\n";
   for (const UnitRow& u : units)
     out += std::string("<SimpleType name=\"") + u.quantity + "\"><Real quantity=\"" + u.quantity + "\" unit=\"" +
            u.name + "\"/></SimpleType>\n";
-  out += "</TypeDefinitions>\n<LogCategories>\n";
-  for (const LogCategory& c : logCategories) {
-    out += "<Category";
-    attribute(out, "name", c.name);
-    attribute(out, "description", c.description);
-    out += "/>\n";
-  }
-  out += "</LogCategories>\n";
+  out += "</TypeDefinitions>\n";
+  appendLogCategories(out);
 }
 
 void appendVariables(Out& to, const std::vector<Block>& blocks, const std::vector<Place>& places, const double* start) {

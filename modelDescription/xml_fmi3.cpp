@@ -24,20 +24,13 @@ void appendHead(std::string& out, const Described& d, const std::string& token) 
 }
 
 void appendDefinitions(std::string& out) {
-  out += "<UnitDefinitions>\n";
-  for (const UnitRow& u : units) out += std::string("<Unit name=\"") + u.name + "\"><BaseUnit" + u.base + "/></Unit>\n";
-  out += "</UnitDefinitions>\n<TypeDefinitions>\n";
+  appendUnits(out);
+  out += "<TypeDefinitions>\n";
   for (const UnitRow& u : units)
     out += std::string("<Float64Type name=\"") + u.quantity + "\" quantity=\"" + u.quantity + "\" unit=\"" + u.name +
            "\"/>\n";
-  out += "</TypeDefinitions>\n<LogCategories>\n";
-  for (const LogCategory& c : logCategories) {
-    out += "<Category";
-    attribute(out, "name", c.name);
-    attribute(out, "description", c.description);
-    out += "/>\n";
-  }
-  out += "</LogCategories>\n";
+  out += "</TypeDefinitions>\n";
+  appendLogCategories(out);
 }
 
 const char* causalityAttributes(Causality causality) {

@@ -9,6 +9,7 @@
 
 #include "dependencies.hpp"
 #include "variables.hpp"
+#include "xml.hpp"
 
 namespace tiefmu {
 
@@ -67,6 +68,23 @@ inline void attribute(std::string& out, std::string_view name, std::string_view 
   out += "=\"";
   appendEscaped(out, value);
   out += '"';
+}
+
+inline void appendUnits(std::string& out) {
+  out += "<UnitDefinitions>\n";
+  for (const UnitRow& u : units) out += std::string("<Unit name=\"") + u.name + "\"><BaseUnit" + u.base + "/></Unit>\n";
+  out += "</UnitDefinitions>\n";
+}
+
+inline void appendLogCategories(std::string& out) {
+  out += "<LogCategories>\n";
+  for (const LogCategory& c : logCategories) {
+    out += "<Category";
+    attribute(out, "name", c.name);
+    attribute(out, "description", c.description);
+    out += "/>\n";
+  }
+  out += "</LogCategories>\n";
 }
 
 // Text on its way to the caller, handed over whenever there is a piece of it.
