@@ -244,7 +244,7 @@ def test_wrong_inputs(weld, scene_file, capsys, tmp_path, case):
             "out.txt: results are written as .csv, .parquet, .h5, .hdf5; the ending chooses",
         ),
         (["run", "weld.toml", "--plot", "out.gif"], "out.gif: pictures are written as .png, .svg; the ending chooses"),
-        (["run", "exchange.fmu"], "exchange.fmu: not an FMU for co-simulation by FMI 2.0"),
+        (["run", "exchange.fmu"], "exchange.fmu: not an FMU for co-simulation by FMI 2.0 or 3.0"),
         (["build", "weld.toml", "-o", "no/weld.fmu"], "no/weld.fmu: folder no does not exist"),
         (["build", "weld.toml", "-o", "folder"], "folder: is a folder"),
         (["demo", "--scenes", "folder"], "folder: no scenes here; give the folder with --scenes"),
