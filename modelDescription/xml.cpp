@@ -14,7 +14,7 @@ namespace tiefmu {
 namespace {
 
 static_assert(std::all_of(std::begin(variableRows), std::end(variableRows),
-                          [](const Variable& v) { return unitRow(v.row().unit) != nullptr; }),
+                          [](const Variable& v) { return isUnit(v.row().unit); }),
               "the unit of a variable is missing here");
 
 // The common validator takes 2 ms for each structured name.

@@ -38,7 +38,13 @@ inline constexpr UnitRow units[] = {
     {"W", R"( kg="1" m="2" s="-3")", "Power"},
 };
 
-inline constexpr const UnitRow* unitRow(std::string_view name) {
+inline constexpr bool isUnit(std::string_view name) {
+  for (const UnitRow& u : units)
+    if (name == u.name) return true;
+  return false;
+}
+
+inline const UnitRow* unitRow(std::string_view name) {
   for (const UnitRow& u : units)
     if (name == u.name) return &u;
   return nullptr;
