@@ -246,29 +246,25 @@ std::string modelIdentifier(const std::string& name) {
 }
 
 struct Xml::Contents : Described {
-  Contents(const Model& model, std::string name, std::string title)
-      : Contents(model, Simulation(std::shared_ptr<const Model>(std::shared_ptr<void>(), &model)), std::move(name),
-                 std::move(title)) {}
+  Contents(const Model& m, std::string n, std::string t)
+      : Contents(m, Simulation(std::shared_ptr<const Model>(std::shared_ptr<void>(), &m)), std::move(n), std::move(t)) {
+  }
 
   bool structuredNames = true;
 
  private:
-  Contents(const Model& model, Simulation&& simulation, std::string n, std::string t)
-      : Described{&model,
-                  std::move(n),
-                  std::move(t),
-                  {simulation.data(), simulation.data() + simulation.layout().size},
-                  {},
-                  {},
-                  {}} {
+  Contents(const Model& m, Simulation&& simulation, std::string n, std::string t)
+      : Described{
+            &m, std::move(n), std::move(t), {simulation.data(), simulation.data() + simulation.layout().size}, {}, {},
+            {}} {
     simulation.initialise(0);
-    experiment = defaultExperiment(model, simulation);
-    blocks = variables(model, simulation.layout());
-    dependencies = tiefmu::dependencies(model, blocks);
+    experiment = defaultExperiment(m, simulation);
+    blocks = variables(m, simulation.layout());
+    dependencies = tiefmu::dependencies(m, blocks);
     std::size_t count = 0;
     for (const Block& b : blocks) count += b.count();
     // Structured names have numbers in brackets, where ports have names.
-    structuredNames = model.settings.names == Names::structured && count <= mostStructuredNames && model.ports.empty();
+    structuredNames = m.settings.names == Names::structured && count <= mostStructuredNames && m.ports.empty();
   }
 };
 
