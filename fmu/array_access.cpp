@@ -31,21 +31,22 @@ std::string ArrayAccess::nameOf(std::uint32_t r) const {
   return arrays_.elements[r - arrays_.arrays.size()].name;
 }
 
+void ArrayAccess::requireKnown(std::uint32_t r) const {
+  const std::size_t last = arrays_.arrays.size() + arrays_.elements.size();
+  if (r > last)
+    throw Refused("unknown value reference " + std::to_string(r) + "; the last one is " + std::to_string(last));
+}
+
 const Array& ArrayAccess::arrayOf(std::uint32_t r) const {
-  const std::size_t n = arrays_.arrays.size();
-  if (r > n + arrays_.elements.size())
-    throw Refused("unknown value reference " + std::to_string(r) + "; the last one is " +
-                  std::to_string(n + arrays_.elements.size()));
+  requireKnown(r);
   if (r == Arrays::time) throw Refused("variable 'time' is the independent variable");
-  if (r > n) throw Refused("variable '" + nameOf(r) + "' is not of type Float64");
+  if (r > arrays_.arrays.size()) throw Refused("variable '" + nameOf(r) + "' is not of type Float64");
   return arrays_.arrays[r - 1];
 }
 
 const Elements& ArrayAccess::elementsOf(std::uint32_t r, bool labels) const {
+  requireKnown(r);
   const std::size_t n = arrays_.arrays.size();
-  if (r > n + arrays_.elements.size())
-    throw Refused("unknown value reference " + std::to_string(r) + "; the last one is " +
-                  std::to_string(n + arrays_.elements.size()));
   if (r <= n || arrays_.elements[r - n - 1].labels.empty() == labels)
     throw Refused("variable '" + nameOf(r) + "' is not of type " + (labels ? "String" : "Int64"));
   return arrays_.elements[r - n - 1];

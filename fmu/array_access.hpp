@@ -35,6 +35,7 @@ class ArrayAccess {
   std::vector<Entry> dependenciesOf(std::uint32_t reference);
 
  private:
+  void requireKnown(std::uint32_t reference) const;
   const Array& arrayOf(std::uint32_t reference) const;
   const Elements& elementsOf(std::uint32_t reference, bool labels) const;
   void spansOf(const std::uint32_t references[], std::size_t count, std::size_t size);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdio>
+#include <cstring>
 #include <exception>
 #include <string>
 
@@ -15,6 +16,9 @@ struct Call {
 
   constexpr bool isAllowedIn(State state) const { return (allowed & static_cast<unsigned>(state)) != 0; }
 };
+
+// An instance name that is no name.
+inline bool isBlank(const char* text) { return text[std::strspn(text, " \t\n\r\f\v")] == 0; }
 
 // The bits of the states that are marked with x in a row of `states` marks.
 consteval unsigned marked(const char* marks, unsigned states) {

@@ -39,8 +39,6 @@ void deliver(const fmi2CallbackLogger callback, fmi2ComponentEnvironment environ
   callback(environment, instanceName, status, category, message);
 }
 
-bool isBlank(const char* text) { return text[std::strspn(text, " \t\n\r\f\v")] == 0; }
-
 // Copied from the caller's callbacks; the environment goes back to it with every message.
 class CallbackLog final : public Log {
  public:

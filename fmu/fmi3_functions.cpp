@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <cstring>
 #include <exception>
 #include <type_traits>
 
@@ -43,8 +42,6 @@ class CallbackLog final : public Log {
   fmi3LogMessageCallback callback_;
   fmi3InstanceEnvironment environment_;
 };
-
-bool isBlank(const char* text) { return text[std::strspn(text, " \t\n\r\f\v")] == 0; }
 
 // Where the importer wants to be asked, a step is done substep by substep: after each but the last it may set inputs,
 // get outputs, and have the step end earlier. True if it did.

@@ -78,7 +78,7 @@ def test_every_kind_of_scene_has_the_variables_of_its_other_fmu(both):
             assert e.description.split(" (")[-1] == other.description.split(" (")[-1]  # the node
 
 
-def test_same_bits_as_by_fmi_2(both, rng=None):
+def test_same_bits_as_by_fmi_2(both):
     three, two = both
     rng = np.random.default_rng(5)
     a, b = Instance(three).start(), fmu_calls.Instance(two).start()
