@@ -148,3 +148,27 @@ def test_units_and_hidden_variables():
     assert tiefmu.report(scene)["ports"][0]["at"] == [1.0, 0.5, 0.2]
     listed = {name for block in scene.start.variables for name in names(block)}
     assert "port[rod].v[1]" in listed and "port[rod].w[1]" not in listed
+
+
+def test_ports_of_what_they_cannot_move(weld):
+    weld["node"].append({"nodes": [3], "motion": "free"})
+    weld["node"].append({"nodes": [4], "motion": "fixed"})
+    weld["mesh"]["nodes"].append([9, 1.0, 0.0, 0.0])
+    for node, line in (
+        (3, "is free; a port moves driven nodes or loads slaves"),
+        (4, "is fixed; a port moves driven nodes or loads slaves"),
+        (9, "no tie and no spring uses it"),
+    ):
+        weld["interface"] = {"ports": [{"name": "a", "nodes": [1, node]}]}
+        with pytest.raises(tiefmu.SceneError) as error:
+            tiefmu.load(weld)
+        assert str(error.value) == f"scene: interface: port 'a': node {node}: {line}"
+
+
+def test_ports_need_integrated_positions(weld):
+    weld |= {"interface": {"ports": [{"name": "a", "nodes": [1]}]}, "model": {"position": "input"}}
+    with pytest.raises(tiefmu.SceneError) as error:
+        tiefmu.load(weld)
+    assert str(error.value) == (
+        "scene: interface: ports: need position = 'integrated' in [model]: a port's nodes move with the port"
+    )

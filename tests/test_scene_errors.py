@@ -361,30 +361,6 @@ CASES = {
 }
 
 
-def test_ports_of_what_they_cannot_move(weld):
-    weld["node"].append({"nodes": [3], "motion": "free"})
-    weld["node"].append({"nodes": [4], "motion": "fixed"})
-    weld["mesh"]["nodes"].append([9, 1.0, 0.0, 0.0])
-    for node, line in (
-        (3, "is free; a port moves driven nodes or loads slaves"),
-        (4, "is fixed; a port moves driven nodes or loads slaves"),
-        (9, "no tie and no spring uses it"),
-    ):
-        weld["interface"] = {"ports": [{"name": "a", "nodes": [1, node]}]}
-        with pytest.raises(tiefmu.SceneError) as error:
-            tiefmu.load(weld)
-        assert str(error.value) == f"scene: interface: port 'a': node {node}: {line}"
-
-
-def test_ports_need_integrated_positions(weld):
-    weld |= {"interface": {"ports": [{"name": "a", "nodes": [1]}]}, "model": {"position": "input"}}
-    with pytest.raises(tiefmu.SceneError) as error:
-        tiefmu.load(weld)
-    assert str(error.value) == (
-        "scene: interface: ports: need position = 'integrated' in [model]: a port's nodes move with the port"
-    )
-
-
 @pytest.mark.parametrize("name", CASES)
 def test_line(name, weld, scene_file, capsys):
     path, value, line = CASES[name]
