@@ -1,4 +1,5 @@
 // A compiled scene: what it tells of itself, and the files of an FMU.
+#include <nanobind/stl/pair.h>
 #include <nanobind/stl/shared_ptr.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
@@ -12,6 +13,7 @@
 #include "../../src/compile.hpp"
 #include "../../src/inertia.hpp"
 #include "../../src/lumping.hpp"
+#include "../../src/port.hpp"
 #include "../../src/segment.hpp"
 #include "../../src/stability.hpp"
 #include "bindings.hpp"
@@ -157,12 +159,26 @@ nb::dict report(const Model& model) {
   return d;
 }
 
+std::pair<Array<double>, Array<double>> spreadPortLoads(const Model& model, Vectors force, Vectors moment) {
+  const std::size_t ports = model.ports.size() - model.drivenPorts(), n = static_cast<std::size_t>(model.slaves());
+  require(force.shape(0) == ports && moment.shape(0) == ports,
+          "force, moment: one row for each of " + std::to_string(ports) + " ports of slaves");
+  const Layout layout(model);
+  std::vector<double> data(layout.size), fs(3 * n), ms(3 * n);
+  Ports(model, layout, data.data()).distributeLoads(force.data(), moment.data(), fs.data(), ms.data());
+  return {numpy<double>(std::move(fs), {n, 3}), numpy<double>(std::move(ms), {n, 3})};
+}
+
 }  // namespace
 
 void bindModel(nb::module_& m) {
   nb::class_<Model>(m, "Model", "A scene searched, checked and sorted. Constant.")
       .def(nb::new_(&compileScene), "scene"_a, "Raises SceneError.")
       .def("report", &report, "What there is to tell: arrays over slaves and nodes in the model's order, findings.")
+      .def(
+          "spread_port_loads", &spreadPortLoads, "force"_a, "moment"_a,
+          "Forces (N) and moments (N m) on the slaves, (slaves, 3) in the model's order, of such loads on the ports of "
+          "slaves, where they are at the start: theory (3.14).")
       .def(
           "resource",
           [](const Model& model, const std::string& guid) {

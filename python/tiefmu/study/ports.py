@@ -7,7 +7,6 @@ from ..scene import Scene
 
 TURN = 0.01  # rad between the rows that a turning port is given at: straight lines between them are right to TURN^2 / 8
 MOST_ROWS = 100_000
-COLLINEAR = 1e12  # condition of the arms' inertia from which slaves are on a line
 
 
 def expand(scene: Scene, time: np.ndarray, values: dict) -> tuple[np.ndarray, dict]:
@@ -36,9 +35,9 @@ def expand(scene: Scene, time: np.ndarray, values: dict) -> tuple[np.ndarray, di
             result[node, "v"] = v + np.cross(w, arm)
             if node in rotating:
                 result[node, "w"] = w
-    for port in ports:
-        if port["of_slaves"]:
-            for (node, key), spread in shares(found, port).items():
+    for which, port in enumerate(port for port in found["ports"] if port["of_slaves"]):
+        if any((port["name"], key) in values for key in "ft"):
+            for (node, key), spread in shares(scene, which).items():
                 load = np.hstack([of(port, "f"), of(port, "t")]) @ spread.T
                 result[node, key] = result.get((node, key), 0) + at(fine, time, load)
     return fine, result
@@ -79,35 +78,23 @@ def rotation(g: np.ndarray) -> np.ndarray:
     return np.eye(3) + np.sinc(angle / np.pi) * cross + 0.5 * np.sinc(angle / (2 * np.pi)) ** 2 * cross @ cross
 
 
-def shares(found: dict, port: dict) -> dict:
-    """{(slave id, "f" | "t"): (3, 6)}: its load from force and moment on a port of slaves, at the start: theory
-    (3.14)."""
-    slaves, nodes = found["slaves"], found["nodes"]
-    index = {node: k for k, node in enumerate(nodes["id"].tolist())}
-    row = {slave: k for k, slave in enumerate(slaves["id"].tolist())}
-    ids = port["ids"].tolist()
-    places = []
-    for k in (row[slave] for slave in ids):
-        corners = [index[node] for node in slaves["nodes"][k][: slaves["corners"][k]].tolist()]
-        weights = slaves["weights"][k][: len(corners)]
-        if found["couplings"][slaves["coupling"][k]] == "mean-motion":  # its offset is from the barycentre
-            weights = np.full(len(corners), 1 / len(corners))
-        places.append(weights @ nodes["position"][corners] + slaves["offset"][k])
-    arms = np.array(places) - np.mean(places, axis=0)
-    lever = np.array(port["at"]) - np.mean(places, axis=0)
-    inertia = (arms**2).sum() * np.eye(3) - arms.T @ arms
-    turning = [found["couplings"][slaves["coupling"][row[slave]]] != "translation" for slave in ids]
-    low, _, high = np.linalg.eigvalsh(inertia)
-    weight = 0.0
-    if low * COLLINEAR < high or not high > 0:
-        weight = 0.5 * np.trace(inertia) / len(ids) or 1.0
-    a = np.linalg.inv(inertia + sum(turning) * weight * np.eye(3)) @ np.hstack([skew(lever), np.eye(3)])
-    spread = {}
-    for slave, arm, turns in zip(ids, arms, turning):
-        spread[slave, "f"] = np.hstack([np.eye(3) / len(ids), np.zeros((3, 3))]) - skew(arm) @ a
-        if turns and weight:
-            spread[slave, "t"] = weight * a
-    return spread
+def shares(scene: Scene, which: int) -> dict:
+    """{(slave id, "f" | "t"): (3, 6)}: its load from force and moment on the port of slaves `which`, from 0,
+    at the start: theory (3.14)."""
+    found = scene.model.report()
+    count = sum(port["of_slaves"] for port in found["ports"])
+    columns = []
+    for k in range(6):
+        load = np.zeros((2, count, 3))
+        load[k // 3, which, k % 3] = 1.0
+        columns.append(scene.model.spread_port_loads(*load))
+    spread = np.moveaxis(np.array(columns), 0, -1)  # (force and moment, slave, 3, 6)
+    return {
+        (slave, key): spread[n, row]
+        for n, key in enumerate("ft")
+        for row, slave in enumerate(found["slaves"]["id"].tolist())
+        if spread[n, row].any()
+    }
 
 
 def skew(d: np.ndarray) -> np.ndarray:
