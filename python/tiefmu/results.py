@@ -12,7 +12,6 @@ import numpy as np
 
 from .errors import UsageError
 
-ONE_BLOCK = 2**26  # bytes of rows that are as good as one block
 MOST_KEPT = 2**29  # bytes of rows kept in memory; of longer runs every k-th row
 
 
@@ -54,12 +53,7 @@ class Kept:
         """rows: expected, about."""
         self.names, self.units = names, units
         self.every = max(1, int(np.ceil(rows * 8 * (1 + len(names)) / MOST_KEPT)))
-        self.count, self.kept, self.filled = 0, [], 0
-        # A run of one block keeps that block; of a longer one the rows are copied to where they stay: putting blocks
-        # together at the end would take their memory twice.
-        self.rows = (
-            np.empty((int(rows) // self.every + 3, 1 + len(names))) if rows * 8 * len(names) > ONE_BLOCK else None
-        )
+        self.count, self.kept = 0, []
         self.low = np.full(1 + len(names), np.inf)
         self.high = -self.low
         self.last = np.empty((1, 1 + len(names)))
@@ -67,22 +61,15 @@ class Kept:
     def write(self, block: np.ndarray) -> None:
         self.low = np.minimum(self.low, block.min(axis=0))
         self.high = np.maximum(self.high, block.max(axis=0))
-        self.keep(block[-self.count % self.every :: self.every])
+        first = -self.count % self.every
+        self.kept.append(block if self.every == 1 else block[first :: self.every].copy())
         self.count += len(block)
         self.last = block[-1:].copy()
 
-    def keep(self, rows: np.ndarray) -> None:
-        if self.rows is None or self.kept or self.filled + len(rows) > len(self.rows):
-            self.kept.append(rows if self.every == 1 else rows.copy())
-        else:
-            self.rows[self.filled : self.filled + len(rows)] = rows
-            self.filled += len(rows)
-
     def result(self, seconds: float) -> Result:
         if self.every > 1 and (self.count - 1) % self.every:
-            self.keep(self.last)
-        parts = ([self.rows[: self.filled]] if self.rows is not None else []) + self.kept
-        rows = parts[0] if len(parts) == 1 else np.concatenate(parts)
+            self.kept.append(self.last)
+        rows = self.kept[0] if len(self.kept) == 1 else np.concatenate(self.kept)
         return Result(
             self.names, self.units, rows, self.count - 1, self.every, self.low, self.high, self.last[0], seconds
         )
