@@ -63,7 +63,7 @@ def lumping(row: dict | None) -> dict | None:
 
 
 def lumping_line(row: dict) -> str:
-    price = "two to ten times" if row["connected"] else "one to five times"
+    price = "two to five times" if row["connected"] else "one to four times"
     ratio = (
         "motions without any true energy" if row["ratio"] is None else f"up to {row['ratio']:.3g} times the true one"
     )
