@@ -153,6 +153,10 @@ def test_dependencies_of_elements_hold_every_influence(mixed):
         stated = listed[name].dependencies
         if stated is not None:
             assert arrays == {v.name for v in stated}
+            kinds = {v.name: kind for v, kind in zip(stated, listed[name].dependenciesKind or [])}
+            words = {1: "constant", 2: "fixed", 5: "dependent"}
+            strongest = {by_reference[r]: max(k for _, other, _, k in found if other == r) for _, r, _, _ in found}
+            assert kinds == {known: words[kind] for known, kind in strongest.items()}
         allowed = {}
         for element, reference, independent, _ in found:
             allowed.setdefault(element, set()).add((by_reference[reference], independent))
