@@ -21,7 +21,7 @@ ArrayAccess::ArrayAccess(Instance& instance)
     : instance_(instance), arrays_(arraysOf(instance.model(), instance.blocks())) {
   std::size_t most = 0;
   for (const Array& a : arrays_.arrays) most += a.spans.size();
-  spans_.reserve(most);
+  for (auto* spans : {&spans_, &knownSpans_}) spans->reserve(most);
 }
 
 std::string ArrayAccess::nameOf(std::uint32_t r) const {
@@ -52,12 +52,12 @@ const Elements& ArrayAccess::elementsOf(std::uint32_t r, bool labels) const {
   return arrays_.elements[r - n - 1];
 }
 
-void ArrayAccess::spansOf(const std::uint32_t refs[], std::size_t count, std::size_t size) {
-  spans_.clear();
+void ArrayAccess::spansOf(const std::uint32_t refs[], std::size_t count, std::size_t size, std::vector<Span>& spans) {
+  spans.clear();
   std::size_t needed = 0;
   for (std::size_t i = 0; i < count; ++i) {
     const Array& array = arrayOf(refs[i]);
-    spans_.insert(spans_.end(), array.spans.begin(), array.spans.end());
+    spans.insert(spans.end(), array.spans.begin(), array.spans.end());
     needed += array.count();
   }
   requireSize(size, needed);
@@ -72,7 +72,7 @@ void ArrayAccess::get(const std::uint32_t refs[], std::size_t count, double valu
   }
   const std::uint32_t* const time = std::find(refs, refs + count, Arrays::time);
   if (time == refs + count) {
-    spansOf(refs, count, size);
+    spansOf(refs, count, size, spans_);
     return instance_.get(spans_, values);
   }
   std::size_t before = 0;
@@ -86,7 +86,7 @@ void ArrayAccess::get(const std::uint32_t refs[], std::size_t count, double valu
 
 void ArrayAccess::set(const std::uint32_t refs[], std::size_t count, const double values[], std::size_t size) {
   requireArrays(refs, count, values, size);
-  spansOf(refs, count, size);
+  spansOf(refs, count, size, spans_);
   instance_.set(spans_, values);
 }
 
@@ -112,7 +112,7 @@ void ArrayAccess::getLabels(const std::uint32_t refs[], std::size_t count, const
 }
 
 std::vector<std::uint32_t> ArrayAccess::scalars(const std::uint32_t refs[], std::size_t count, std::size_t size) {
-  spansOf(refs, count, size);
+  spansOf(refs, count, size, spans_);
   std::vector<std::uint32_t> result;
   result.reserve(size);
   for (const Span& s : spans_)
@@ -120,13 +120,15 @@ std::vector<std::uint32_t> ArrayAccess::scalars(const std::uint32_t refs[], std:
   return result;
 }
 
-void ArrayAccess::directionalDerivative(const std::uint32_t unknown[], std::size_t unknowns,
-                                        const std::uint32_t known[], std::size_t knowns, const double seed[],
-                                        std::size_t seeds, double change[], std::size_t changes) {
-  requireArrays(unknown, unknowns, change, changes);
-  requireArrays(known, knowns, seed, seeds);
-  const std::vector<std::uint32_t> to = scalars(unknown, unknowns, changes), from = scalars(known, knowns, seeds);
-  instance_.directionalDerivative(to.data(), to.size(), from.data(), from.size(), seed, change);
+void ArrayAccess::derivative(Way way, const std::uint32_t unknown[], std::size_t unknowns, const std::uint32_t known[],
+                             std::size_t knowns, const double seed[], std::size_t seeds, double result[],
+                             std::size_t results) {
+  const bool forward = way == Way::forward;
+  requireArrays(unknown, unknowns, forward ? result : seed, forward ? results : seeds);
+  requireArrays(known, knowns, forward ? seed : result, forward ? seeds : results);
+  spansOf(unknown, unknowns, forward ? results : seeds, spans_);
+  spansOf(known, knowns, forward ? seeds : results, knownSpans_);
+  instance_.derivative(way, spans_, knownSpans_, seed, result);
 }
 
 void ArrayAccess::outputDerivatives(const std::uint32_t refs[], std::size_t count, const int orders[], double values[],

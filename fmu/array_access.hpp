@@ -19,9 +19,9 @@ class ArrayAccess {
   void set(const std::uint32_t references[], std::size_t count, const double values[], std::size_t size);
   void getIds(const std::uint32_t references[], std::size_t count, std::int64_t values[], std::size_t size) const;
   void getLabels(const std::uint32_t references[], std::size_t count, const char* values[], std::size_t size) const;
-  void directionalDerivative(const std::uint32_t unknown[], std::size_t unknowns, const std::uint32_t known[],
-                             std::size_t knowns, const double seed[], std::size_t seeds, double change[],
-                             std::size_t changes);
+  // Forward: of the unknowns along a seed of the knowns. Transposed: of the knowns by a seed of the unknowns.
+  void derivative(Way way, const std::uint32_t unknown[], std::size_t unknowns, const std::uint32_t known[],
+                  std::size_t knowns, const double seed[], std::size_t seeds, double result[], std::size_t results);
   void outputDerivatives(const std::uint32_t references[], std::size_t count, const int orders[], double values[],
                          std::size_t size);
 
@@ -38,14 +38,14 @@ class ArrayAccess {
   void requireKnown(std::uint32_t reference) const;
   const Array& arrayOf(std::uint32_t reference) const;
   const Elements& elementsOf(std::uint32_t reference, bool labels) const;
-  void spansOf(const std::uint32_t references[], std::size_t count, std::size_t size);
+  void spansOf(const std::uint32_t references[], std::size_t count, std::size_t size, std::vector<Span>& spans);
   // Value references of FMI 2.0, element by element.
   std::vector<std::uint32_t> scalars(const std::uint32_t references[], std::size_t count, std::size_t size);
   std::string nameOf(std::uint32_t reference) const;
 
   Instance& instance_;
   const Arrays arrays_;
-  std::vector<Span> spans_;  // of the present call
+  std::vector<Span> spans_, knownSpans_;  // of the present call
   std::unique_ptr<const Dependencies> dependencies_;
 };
 

@@ -45,6 +45,27 @@ void Instance::directionalDerivative(const std::uint32_t unknown[], std::size_t 
   takeScratch(unknown, unknowns, change);
 }
 
+void Instance::derivative(Way way, const std::vector<Span>& unknowns, const std::vector<Span>& knowns,
+                          const double seed[], double result[]) {
+  for (const Span& s : unknowns) require(rangeOf(s.first), s.first, Causality::output);
+  for (const Span& s : knowns) require(rangeOf(s.first), s.first, Causality::input);
+  const bool forward = way == Way::forward;
+  scratch.assign(simulation.layout().size, 0.0);
+  for (const Span& s : forward ? knowns : unknowns) {
+    for (std::size_t k = 0; k < s.count; ++k) {
+      if (!std::isfinite(seed[k])) refuseValue(s.first, seed);
+      scratch[s.place + k] += seed[k];
+    }
+    seed += s.count;
+  }
+  if (forward)
+    simulation.directionalDerivative(scratch.data());
+  else
+    simulation.adjointDerivative(scratch.data());
+  for (const Span& s : forward ? unknowns : knowns)
+    result = std::copy_n(scratch.begin() + static_cast<std::ptrdiff_t>(s.place), s.count, result);
+}
+
 void Instance::setInputDerivatives(const std::uint32_t refs[], std::size_t count, const int orders[],
                                    const double values[]) {
   if (count > 0 && !refs) throw Refused("the array of value references is a null pointer");

@@ -53,6 +53,7 @@ constexpr Call deserializeFMUState     {"fmi3DeserializeFMUState",     row("x x 
 constexpr Call getNumberOfDependencies {"fmi3GetNumberOfVariableDependencies", row("x x x . x x")};
 constexpr Call getDependencies         {"fmi3GetVariableDependencies", row("x x x . x x")};
 constexpr Call getDirectionalDerivative{"fmi3GetDirectionalDerivative",row(". x x . x x")};
+constexpr Call getAdjointDerivative    {"fmi3GetAdjointDerivative",    row(". x x . x x")};
 constexpr Call getOutputDerivatives    {"fmi3GetOutputDerivatives",    row(". . x . x x")};
 constexpr Call doStep                  {"fmi3DoStep",                  row(". . x . . .")};
 // clang-format on

@@ -218,7 +218,16 @@ fmi3Status fmi3GetDirectionalDerivative(fmi3Instance c, const fmi3ValueReference
                                         const fmi3ValueReference knowns[], size_t nKnowns, const fmi3Float64 seed[],
                                         size_t nSeed, fmi3Float64 sensitivity[], size_t nSensitivity) {
   return guard(c, call::getDirectionalDerivative, [&](Fmi3Instance& own) {
-    own.arrays.directionalDerivative(unknowns, nUnknowns, knowns, nKnowns, seed, nSeed, sensitivity, nSensitivity);
+    own.arrays.derivative(Way::forward, unknowns, nUnknowns, knowns, nKnowns, seed, nSeed, sensitivity, nSensitivity);
+  });
+}
+
+fmi3Status fmi3GetAdjointDerivative(fmi3Instance c, const fmi3ValueReference unknowns[], size_t nUnknowns,
+                                    const fmi3ValueReference knowns[], size_t nKnowns, const fmi3Float64 seed[],
+                                    size_t nSeed, fmi3Float64 sensitivity[], size_t nSensitivity) {
+  return guard(c, call::getAdjointDerivative, [&](Fmi3Instance& own) {
+    own.arrays.derivative(Way::transposed, unknowns, nUnknowns, knowns, nKnowns, seed, nSeed, sensitivity,
+                          nSensitivity);
   });
 }
 

@@ -146,11 +146,6 @@ fmi3Status fmi3SetClock(fmi3Instance c, const fmi3ValueReference*, size_t n, con
   return noVariables(c, "fmi3SetClock", n);
 }
 
-fmi3Status fmi3GetAdjointDerivative(fmi3Instance c, const fmi3ValueReference*, size_t, const fmi3ValueReference*,
-                                    size_t, const fmi3Float64*, size_t, fmi3Float64*, size_t) {
-  return refuse(c, "fmi3GetAdjointDerivative", "adjoint derivatives are not provided");
-}
-
 fmi3Status fmi3EnterConfigurationMode(fmi3Instance c) { return refuse(c, "fmi3EnterConfigurationMode", noStructure); }
 
 fmi3Status fmi3ExitConfigurationMode(fmi3Instance c) { return refuse(c, "fmi3ExitConfigurationMode", noStructure); }

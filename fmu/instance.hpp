@@ -68,6 +68,10 @@ class Instance {
   // change[k] = sum over l of d unknown[k] / d known[l] * seed[l], for outputs and inputs.
   void directionalDerivative(const std::uint32_t unknown[], std::size_t unknowns, const std::uint32_t known[],
                              std::size_t knowns, const double seed[], double change[]);
+  // The same for whole spans, whose values follow each other; or transposed: result[l] = sum over k of seed[k] *
+  // d unknown[k] / d known[l].
+  void derivative(Way way, const std::vector<Span>& unknowns, const std::vector<Span>& knowns, const double seed[],
+                  double result[]);
   void setInputDerivatives(const std::uint32_t references[], std::size_t count, const int orders[],
                            const double values[]);
   void outputDerivatives(const std::uint32_t references[], std::size_t count, const int orders[], double values[]);

@@ -18,7 +18,8 @@ void appendHead(std::string& out, const Described& d, const std::string& token) 
   attribute(out, "modelIdentifier", modelIdentifier(d.name));
   out += R"( canHandleVariableCommunicationStepSize="true" maxOutputDerivativeOrder="1")"
          R"( canBeInstantiatedOnlyOncePerProcess="false" canGetAndSetFMUState="true" canSerializeFMUState="true")"
-         R"( providesDirectionalDerivatives="true" providesPerElementDependencies="true")"
+         R"( providesDirectionalDerivatives="true" providesAdjointDerivatives="true")"
+         R"( providesPerElementDependencies="true")"
          R"( providesIntermediateUpdate="true" canReturnEarlyAfterIntermediateUpdate="true"/>)"
          "\n";
 }

@@ -15,6 +15,9 @@ using Quat = Eigen::Quaterniond;
 using MapVec3 = Eigen::Map<Vec3>;
 using ConstMapVec3 = Eigen::Map<const Vec3>;
 
+// How a derivative runs: a linear map forward, y += A x, or its transpose, x += A^T y.
+enum class Way { forward, transposed };
+
 inline MapVec3 at(double* p, Eigen::Index i) { return MapVec3(p + 3 * i); }
 inline ConstMapVec3 at(const double* p, Eigen::Index i) { return ConstMapVec3(p + 3 * i); }
 
@@ -26,6 +29,14 @@ inline Mat3 skew(const Vec3& u) {
   Mat3 m;
   m << 0, -u.z(), u.y(), u.z(), 0, -u.x(), -u.y(), u.x(), 0;
   return m;
+}
+
+// Change of w x (w x d) along dw, and the gradient of its product with `load` along dw.
+inline Vec3 centripetalDerivative(const Vec3& w, const Vec3& dw, const Vec3& d) {
+  return dw.cross(w.cross(d)) + w.cross(dw.cross(d));
+}
+inline Vec3 centripetalGradient(const Vec3& w, const Vec3& d, const Vec3& load) {
+  return w.cross(d).cross(load) + d.cross(load.cross(w));
 }
 
 // Unit quaternion of the rotation vector `angle` (rad): the exponential map of SO(3), exact for any angle.

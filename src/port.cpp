@@ -145,27 +145,30 @@ void Ports::advance(const InputCurve& inputs, double tau, double h) {
   }
 }
 
-void Ports::moveDerivative(double* derivative) const {
-  const auto change = [&](Field f) { return derivative + layout_[f].offset; };
+void Ports::differentiateMotion(Way way, double* array) const {
+  const auto of = [&](Field f) { return array + layout_[f].offset; };
+  const auto rigid = [&](Field v, Field w, Field nodeV, Field nodeW) {
+    if (way == Way::forward)
+      spread(of(v), of(w), of(nodeV), of(nodeW));
+    else
+      gather(of(nodeV), of(nodeW), of(v), of(w));
+  };
+  rigid(Field::portVelocity, Field::portSpin, Field::velocity, Field::spin);
+  if (!model_.accelerationInputs()) return;
+  rigid(Field::portAcceleration, Field::portAngularAcceleration, Field::acceleration, Field::angularAcceleration);
+  if (!model_.finite()) return;
   for (std::size_t p = 0; p < driven_; ++p) {
     const Port& port = model_.ports[p];
     const Mat3 turned = rotation(p);
     const Vec3 w = at(field(Field::portSpin), p);
-    const Vec3 dv = at(change(Field::portVelocity), p), dw = at(change(Field::portSpin), p);
-    Vec3 da = Vec3::Zero(), dz = Vec3::Zero();
-    if (model_.accelerationInputs()) {
-      da = at(change(Field::portAcceleration), p);
-      dz = at(change(Field::portAngularAcceleration), p);
-    }
+    MapVec3 change = at(of(Field::portSpin), p);
     for (std::size_t i = 0; i < port.member.size(); ++i) {
-      const int node = port.member[i];
       const Vec3 r = turned * at(port.arm.data(), i);
-      at(change(Field::velocity), node) = dv + dw.cross(r);
-      if (node < model_.rotating()) at(change(Field::spin), node) = dw;
-      if (!model_.accelerationInputs()) continue;
-      at(change(Field::acceleration), node) = da + dz.cross(r);
-      if (model_.finite()) at(change(Field::acceleration), node) += dw.cross(w.cross(r)) + w.cross(dw.cross(r));
-      if (node < model_.rotating()) at(change(Field::angularAcceleration), node) = dz;
+      MapVec3 acceleration = at(of(Field::acceleration), port.member[i]);
+      if (way == Way::forward)
+        acceleration += centripetalDerivative(w, change, r);
+      else
+        change += centripetalGradient(w, r, acceleration);
     }
   }
 }
@@ -184,6 +187,19 @@ void Ports::gather(const double* f, const double* t, double* force, double* mome
     }
     at(force, p) += sum;
     at(moment, p) += turning;
+  }
+}
+
+void Ports::spread(const double* v, const double* w, double* nodeV, double* nodeW) const {
+  for (std::size_t p = 0; p < driven_; ++p) {
+    const Port& port = model_.ports[p];
+    const Mat3 turned = rotation(p);
+    const Vec3 velocity = at(v, p), spin = at(w, p);
+    for (std::size_t i = 0; i < port.member.size(); ++i) {
+      const int node = port.member[i];
+      at(nodeV, node) += velocity + spin.cross(turned * at(port.arm.data(), i));
+      if (node < model_.rotating()) at(nodeW, node) += spin;
+    }
   }
 }
 

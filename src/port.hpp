@@ -39,9 +39,12 @@ class Ports {
   // Before a drift over [tau, tau + h] of the inputs' curve: the velocities and spins that carry the nodes to its end.
   void carry(const InputCurve& inputs, double tau, double h);
   void advance(const InputCurve& inputs, double tau, double h);  // after it: pose, positions and velocities at the end
-  void moveDerivative(double* derivative) const;  // of the nodes' motion along the inputs', laid out like `data`
+  // How `move` changes, in an array laid out like `data`: adds to the nodes' motion, or transposed to the inputs.
+  void differentiateMotion(Way way, double* array) const;
   // Resultants of the nodes' loads (f 3 per node, N; t 3 per rotating node, N m), added to force, moment (3 per port).
   void gather(const double* f, const double* t, double* force, double* moment) const;
+  // The transpose: a rigid motion of each port, added to that of its nodes.
+  void spread(const double* v, const double* w, double* nodeV, double* nodeW) const;
 
   // --- slaves
   // Arms and J at slave positions `xs` (m; small displacements: as they were at the start). `quaternion(k)`: the

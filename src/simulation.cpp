@@ -5,10 +5,10 @@
 #include <cmath>
 #include <cstdio>
 
-#include "directional_derivative.hpp"
 #include "divergence.hpp"
 #include "dynamics.hpp"
 #include "integrator.hpp"
+#include "linearization.hpp"
 #include "outputs.hpp"
 #include "step_backup.hpp"
 #include "time_step_limit.hpp"
@@ -34,7 +34,7 @@ struct Simulation::Impl {
   DivergenceChecks checks;
   Outputs outputs;
   StepBackup backup;
-  std::unique_ptr<DirectionalDerivative> derivative;  // made at its first call
+  std::unique_ptr<Linearization> linearization;  // made at its first use
   double time = 0;
   std::int64_t substeps = 0;
   std::uint32_t flags = 0;
@@ -353,11 +353,14 @@ void Simulation::updateReactions() {
   impl_->dynamics.bringReactions();
 }
 
-void Simulation::directionalDerivative(double* derivative) {
+Linearization& Simulation::linearised() {
   updateOutputs();
-  if (!impl_->derivative) impl_->derivative = std::make_unique<DirectionalDerivative>(impl_->dynamics);
-  impl_->derivative->evaluate(derivative);
+  if (!impl_->linearization) impl_->linearization = std::make_unique<Linearization>(impl_->dynamics);
+  return *impl_->linearization;
 }
+
+void Simulation::directionalDerivative(double* array) { linearised().directional(array); }
+void Simulation::adjointDerivative(double* array) { linearised().adjoint(array); }
 
 void Simulation::save(State& state) const {
   const Impl& s = *impl_;

@@ -11,6 +11,8 @@
 
 namespace tiefmu {
 
+class Linearization;
+
 class Simulation {
  public:
   explicit Simulation(std::shared_ptr<const Model> model);
@@ -62,9 +64,12 @@ class Simulation {
   void save(State& state) const;
   void restore(const State& state);
 
-  // Directional derivative at the present state: `derivative` is laid out like `data`; on entry it holds a change of
-  // the inputs and zeros elsewhere, on return that of every output. Free nodes' motion is a state and does not change.
-  void directionalDerivative(double* derivative);
+  // Derivatives of the outputs by the inputs at the present state, J; free nodes' motion is a state and does not
+  // change. `array` is laid out like `data` and holds zeros but for what is given. Directional: of a change of the
+  // inputs, that of every output, J dx. Adjoint: of weights of the outputs, the gradient of their sum along each input,
+  // J^T y. All else that stands in the array then is scratch.
+  void directionalDerivative(double* array);
+  void adjointDerivative(double* array);
 
   // Forces evaluated so far (a machine-independent cost).
   std::int64_t evaluations() const;
@@ -74,6 +79,8 @@ class Simulation {
   double integratorLimit() const;
 
  private:
+  Linearization& linearised();
+
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };

@@ -36,12 +36,14 @@ class Beam {
   }
   Vec3 twist() const { return axes.transpose() * turn; }
   Vec3 twistRate(const EndMotion& a, const EndMotion& b) const { return axes.transpose() * turnRate(b.w - a.w); }
+  // What a couple adds to the bending, as it turns the axes.
+  Vec3 lean(const Vec3& couple) const { return lean_ * couple.cross(turn); }
   // Loads of a force and a moment along the axes; `arm`: the line that the force turns about.
   SpringLoad loads(const Vec3& force, const Vec3& moment, const Vec3& arm) const {
     SpringLoad load;
     load.fb = axes * force;
     load.fa = -load.fb;
-    const Vec3 couple = arm.cross(load.fb), bending = turnRate(axes * moment) + lean_ * couple.cross(turn);
+    const Vec3 couple = arm.cross(load.fb), bending = turnRate(axes * moment) + lean(couple);
     load.ta = 0.5 * couple + bending;
     load.tb = 0.5 * couple - bending;
     return load;
@@ -74,21 +76,49 @@ SpringLoad beamTangent(const Spring& spring, const EndMotion& a, const EndMotion
   return beam.loads(force, moment, beam.line);
 }
 
-SpringLoad beamLoadDerivative(const Spring& spring, const EndMotion& a, const EndMotion& b, const EndMotion& da,
-                              const EndMotion& db) {
+// Its columns are what f makes of the unit vectors.
+template <class F> Mat3 matrixOf(F f) {
+  Mat3 m;
+  for (int k = 0; k < 3; ++k) m.col(k) = f(Vec3::Unit(k));
+  return m;
+}
+
+// Where the blocks of a SpringJacobian begin.
+namespace row {
+enum : int { fb = 0, ta = 3, tb = 6 };
+}
+namespace column {
+enum : int { line = 0, gap = 3, wa = 6, wb = 9 };
+}
+using LoadRow = Eigen::Matrix<double, 3, 12>;
+
+SpringJacobian beamJacobian(const Spring& spring, const EndMotion& a, const EndMotion& b) {
   const Beam beam(spring, a, b);
-  const Vec3 dLine = da.x - db.x, dShift = beam.axes.transpose() * dLine;
-  const Vec3 dRate = beam.shiftRate(da, db) - beam.axes.transpose() * beam.middleSpin(a.w, b.w).cross(dLine);
+  const Vec3 none = Vec3::Zero();
+  const auto inAxes = [&](const Vec3& diagonal) -> Mat3 {
+    return beam.axes * diagonal.asDiagonal() * beam.axes.transpose();
+  };
   const Vec3 elastic = spring.stiffness.cwiseProduct(beam.shift);
-  const Vec3 force = elastic + spring.damping.cwiseProduct(beam.shiftRate(a, b));
-  const Vec3 dForce = spring.stiffness.cwiseProduct(dShift) + spring.damping.cwiseProduct(dRate);
-  const Vec3 dMoment = spring.rotationalDamping.cwiseProduct(beam.twistRate(da, db));
-  SpringLoad change = beam.loads(dForce, dMoment, beam.line);
-  const SpringLoad turned = beam.loads(force, Vec3::Zero(), dLine);  // the force itself, over the line's change
-  change.ta += turned.ta;
-  change.tb += turned.tb;
-  change.energy = elastic.dot(dShift);
-  return change;
+  const Vec3 force = beam.axes * (elastic + spring.damping.cwiseProduct(beam.shiftRate(a, b)));
+  const Mat3 damping = inAxes(spring.damping), arm = skew(beam.line);
+  // F: the shift changes with the line, its rate with the line, the gap and the spin of the axes.
+  LoadRow dForce;
+  dForce.middleCols<3>(column::line) = inAxes(spring.stiffness) - damping * skew(beam.middleSpin(a.w, b.w));
+  dForce.middleCols<3>(column::gap) = damping;
+  dForce.middleCols<3>(column::wa) = damping * arm * matrixOf([&](const Vec3& w) { return beam.middleSpin(w, none); });
+  dForce.middleCols<3>(column::wb) = damping * arm * matrixOf([&](const Vec3& w) { return beam.middleSpin(none, w); });
+  // C = line x F and N = S M + lean C x theta, in which M changes with the spins.
+  LoadRow dCouple = arm * dForce;
+  dCouple.middleCols<3>(column::line) -= skew(force);
+  LoadRow dBending = matrixOf([&](const Vec3& couple) { return beam.lean(couple); }) * dCouple;
+  const Mat3 rate = matrixOf([&](const Vec3& spin) { return beam.turnRate(spin); });
+  const Mat3 twisting = rate * inAxes(spring.rotationalDamping) * rate;
+  dBending.middleCols<3>(column::wa) -= twisting;
+  dBending.middleCols<3>(column::wb) += twisting;
+  SpringJacobian j;
+  j.loads << dForce, 0.5 * dCouple + dBending, 0.5 * dCouple - dBending;
+  j.energy = beam.axes * elastic;
+  return j;
 }
 
 }  // namespace
@@ -150,32 +180,33 @@ SpringLoad springTangent(const Spring& spring, const EndMotion& a, const EndMoti
   return load;
 }
 
-SpringLoad springLoadDerivative(const Spring& spring, const EndMotion& a, const EndMotion& b, const EndMotion& da,
-                                const EndMotion& db) {
-  if (spring.kind == SpringKind::beam) return beamLoadDerivative(spring, a, b, da, db);
-  SpringLoad change;
-  const Vec3 line = a.x - b.x, dLine = da.x - db.x;
+SpringJacobian springJacobian(const Spring& spring, const EndMotion& a, const EndMotion& b) {
+  if (spring.kind == SpringKind::beam) return beamJacobian(spring, a, b);
+  SpringJacobian j;
+  const Vec3 across = a.x - b.x;
   if (spring.kind == SpringKind::axial) {
-    const double length = line.norm();
-    if (!(length > 0)) return change;
-    const Vec3 n = line / length, dn = (dLine - n.dot(dLine) * n) / length;
+    const double length = across.norm();
+    if (!(length > 0)) return j;
+    const Vec3 n = across / length, speed = a.v - b.v;
+    const Mat3 turn = (Mat3::Identity() - n * n.transpose()) / length;  // dn = turn dLine
     const double k = spring.stiffness[0], c = spring.damping[0], elongation = length - spring.length;
-    const double tension = k * elongation + c * n.dot(a.v - b.v);
-    const double dTension = k * n.dot(dLine) + c * (dn.dot(a.v - b.v) + n.dot(da.v - db.v));
-    change.fb = dTension * n + tension * dn;
-    change.fa = -change.fb;
-    change.energy = k * elongation * n.dot(dLine);
-    return change;
+    const double tension = k * elongation + c * n.dot(speed);
+    j.loads.block<3, 3>(row::fb, column::line) = n * (k * n + c * (turn * speed)).transpose() + tension * turn;
+    j.loads.block<3, 3>(row::fb, column::gap) = c * n * n.transpose();
+    j.energy = k * elongation * n;
+    return j;
   }
-  const SpringLoad load = springLoad(spring, a, b);
-  const Vec3 dRate = da.v - db.v - db.w.cross(line) - b.w.cross(dLine);
-  const Vec3 elastic = spring.stiffness.cwiseProduct(line - b.q * spring.arm);
-  change.fb = spring.stiffness.cwiseProduct(dLine) + spring.damping.cwiseProduct(dRate);
-  change.fa = -change.fb;
-  change.ta = spring.rotationalDamping.cwiseProduct(db.w - da.w);
-  change.tb = dLine.cross(load.fb) + line.cross(change.fb) - change.ta;
-  change.energy = elastic.dot(dLine);
-  return change;
+  const Mat3 damping = spring.damping.asDiagonal(), twisting = spring.rotationalDamping.asDiagonal();
+  const Mat3 arm = skew(across);
+  j.loads.block<3, 3>(row::fb, column::line) = Mat3(spring.stiffness.asDiagonal()) - damping * skew(b.w);
+  j.loads.block<3, 3>(row::fb, column::gap) = damping;
+  j.loads.block<3, 3>(row::fb, column::wb) = damping * arm;
+  j.loads.block<3, 3>(row::ta, column::wa) = -twisting;
+  j.loads.block<3, 3>(row::ta, column::wb) = twisting;
+  j.loads.middleRows<3>(row::tb) = arm * j.loads.middleRows<3>(row::fb) - j.loads.middleRows<3>(row::ta);
+  j.loads.block<3, 3>(row::tb, column::line) -= skew(springLoad(spring, a, b).fb);
+  j.energy = spring.stiffness.cwiseProduct(across - b.q * spring.arm);
+  return j;
 }
 
 }  // namespace tiefmu

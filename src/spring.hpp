@@ -30,9 +30,12 @@ SpringLoad springLoad(const Spring& spring, const EndMotion& a, const EndMotion&
 // damping coefficients in place of the stiffness. Symmetric and positive semidefinite.
 SpringLoad springTangent(const Spring& spring, const EndMotion& a, const EndMotion& b, bool damping);
 
-// Change of springLoad when the ends' x, v and w change by da and db (their rotations stay): exact, to first order.
-// `energy` is the change of the stored energy.
-SpringLoad springLoadDerivative(const Spring& spring, const EndMotion& a, const EndMotion& b, const EndMotion& da,
-                                const EndMotion& db);
+// How springLoad changes with its ends' x, v and w (their rotations stay), exact to first order, in blocks of 3 x 3:
+// fb, ta and tb (fa = -fb) by x_a - x_b, v_a - v_b, w_a and w_b; and the stored energy by x_a - x_b.
+struct SpringJacobian {
+  Eigen::Matrix<double, 9, 12> loads = Eigen::Matrix<double, 9, 12>::Zero();
+  Vec3 energy = Vec3::Zero();
+};
+SpringJacobian springJacobian(const Spring& spring, const EndMotion& a, const EndMotion& b);
 
 }  // namespace tiefmu

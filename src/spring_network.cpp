@@ -86,32 +86,53 @@ void SpringNetwork::applyTangent(const double* u, const double* turn, double* f,
   slaves_.distributeLoads(slaveForce_.data(), slaveMoment_.data(), f, t);
 }
 
-double SpringNetwork::addLoadDerivatives(const double* v, const double* w, const MotionArrays& change,
-                                         const LoadArrays& to) {
+void SpringNetwork::differentiate(Way way, const double* v, const double* w, const MotionArrays& motions,
+                                  const LoadArrays& loads, double& strain) {
   slaves_.updatePositions();
   slaves_.updateMotion(v, w);
-  const auto changeOf = [&](const SpringEnd& end) {
-    EndMotion m;
-    if (end.node >= 0) {
-      if (change.x) m.x = at(change.x, end.node);
-      m.v = at(change.v, end.node);
-      if (end.node < model_.rotating()) m.w = at(change.w, end.node);
-    } else if (end.slave >= 0) {
-      m.x = at(change.xs, end.slave);
-      m.v = at(change.vs, end.slave);
-      if (end.slave < model_.turning()) m.w = at(change.ws, end.slave);
-    }
-    return m;
+  struct Places { double *x = nullptr, *v = nullptr, *w = nullptr, *f = nullptr, *t = nullptr; };
+  const auto placesOf = [&](const SpringEnd& end) {  // null: none
+    Places p;
+    const bool ofSlave = end.slave >= 0;
+    if (end.node < 0 && !ofSlave) return p;
+    const std::ptrdiff_t k = 3 * static_cast<std::ptrdiff_t>(ofSlave ? end.slave : end.node);
+    if (motions.x) p.x = (ofSlave ? motions.xs : motions.x) + k;
+    p.v = (ofSlave ? motions.vs : motions.v) + k;
+    p.f = (ofSlave ? loads.fs : loads.f) + k;
+    if (ofSlave ? end.slave >= model_.turning() : end.node >= model_.rotating()) return p;
+    p.w = (ofSlave ? motions.ws : motions.w) + k;
+    p.t = (ofSlave ? loads.ms : loads.t) + k;
+    return p;
   };
-  double strain = 0;
+  const auto read = [](const double* p) -> Vec3 { return p ? Vec3(at(p, 0)) : Vec3(0, 0, 0); };
+  const auto add = [](const Vec3& value, double* p) {
+    if (p) at(p, 0) += value;
+  };
   for (const Spring& spring : model_.springs) {
-    const SpringLoad l = springLoadDerivative(spring, motion(spring.a, spring, v, w), motion(spring.b, spring, v, w),
-                                              changeOf(spring.a), changeOf(spring.b));
-    addTo(spring.a, l.fa, l.ta, to);
-    addTo(spring.b, l.fb, l.tb, to);
-    strain += l.energy;
+    const SpringJacobian j = springJacobian(spring, motion(spring.a, spring, v, w), motion(spring.b, spring, v, w));
+    const Places a = placesOf(spring.a), b = placesOf(spring.b);
+    Eigen::Matrix<double, 12, 1> change;
+    Eigen::Matrix<double, 9, 1> load;
+    if (way == Way::forward) {
+      change << read(a.x) - read(b.x), read(a.v) - read(b.v), read(a.w), read(b.w);
+      load = j.loads * change;
+      add(-load.head<3>(), a.f);
+      add(load.head<3>(), b.f);
+      add(load.segment<3>(3), a.t);
+      add(load.tail<3>(), b.t);
+      strain += j.energy.dot(change.head<3>());
+    } else {
+      load << read(b.f) - read(a.f), read(a.t), read(b.t);
+      change = j.loads.transpose() * load;
+      change.head<3>() += strain * j.energy;
+      add(change.head<3>(), a.x);
+      add(-change.head<3>(), b.x);
+      add(change.segment<3>(3), a.v);
+      add(-change.segment<3>(3), b.v);
+      add(change.segment<3>(6), a.w);
+      add(change.tail<3>(), b.w);
+    }
   }
-  return strain;
 }
 
 Vec3 SpringNetwork::spin(const SpringEnd& end, const double* w) const {

@@ -14,7 +14,7 @@ namespace tiefmu {
 struct LoadArrays { double *f, *t, *fs, *ms; };
 
 // A motion of nodes and of slaves, m, m/s and rad/s, arranged alike. x: null where no position changes.
-struct MotionArrays { const double *x, *v, *w, *xs, *vs, *ws; };
+struct MotionArrays { double *x, *v, *w, *xs, *vs, *ws; };
 
 class SpringNetwork {
  public:
@@ -34,8 +34,10 @@ class SpringNetwork {
   // Restoring loads K u (or damping C u) for a motion of the nodes: u 3 per node, turn 3 per rotating node; writes f, t
   // likewise. Includes T and T^T of the slaves.
   void applyTangent(const double* u, const double* turn, double* f, double* t, bool damping);
-  // Adds the derivatives of addLoads along a `change` of nodes and slaves; returns that of the strain energy.
-  double addLoadDerivatives(const double* v, const double* w, const MotionArrays& change, const LoadArrays& to);
+  // How addLoads at v, w and the strain energy (J) change with a motion of nodes and slaves. Adds to `loads` and
+  // `strain`, or transposed to the motion.
+  void differentiate(Way way, const double* v, const double* w, const MotionArrays& motion, const LoadArrays& loads,
+                     double& strain);
 
   // The unit quaternion (w, x, y, z) that SpringEnd::orientation counts.
   const double* rotation(int index) const;

@@ -70,14 +70,18 @@ void accelerate(std::size_t nodes, const double* load, const double* reaction, c
 // Is every |value| below the limit? NaN is not.
 bool within(std::size_t count, const double* value, double limit);
 
-// Directional derivatives along a change dx of the nodes' positions (3 per node, m), which only meanMotion couplings
-// feel. Each adds to its result.
+// A motion of nodes that derivatives are taken along, or gradients by it: m, m/s, rad/s; 3 per node, w per rotating
+// node. x: null where no position changes.
+struct MotionChange { double *x, *v, *w; };
+
+// Derivatives along a change dx of the nodes' positions (3 per node, m), which only meanMotion couplings feel, and the
+// bias also along v and w. Each adds to its result: forward to what stands last, transposed to the change.
 //   mapMotionDerivative: (dT) u    distributeLoadsDerivative: (dT)^T (F, M)    biasDerivative: db
-void mapMotionDerivative(const TieGroup& group, TieGeometry geometry, const double* dx, const double* u, double* us,
+void mapMotionDerivative(Way way, const TieGroup& group, TieGeometry geometry, double* dx, const double* u, double* us,
                          double* turns);
-void distributeLoadsDerivative(const TieGroup& group, TieGeometry geometry, const double* dx, const double* force,
+void distributeLoadsDerivative(Way way, const TieGroup& group, TieGeometry geometry, double* dx, const double* force,
                                const double* moment, double* f);
-void biasDerivative(const TieGroup& group, TieGeometry geometry, const double* dx, const double* velocity, double* as,
-                    double* zs);
+void biasDerivative(Way way, const TieGroup& group, TieGeometry geometry, const double* velocity, const double* spin,
+                    const MotionChange& change, double* as, double* zs);
 
 }  // namespace tiefmu

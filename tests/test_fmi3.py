@@ -314,6 +314,7 @@ ALLOWED = {
     "GetFMUState": ALWAYS,
     "GetNumberOfVariableDependencies": ALWAYS,
     "GetDirectionalDerivative": ALWAYS[1:],
+    "GetAdjointDerivative": ALWAYS[1:],
     "GetOutputDerivatives": ALWAYS[2:],
     "DoStep": ["Step Mode"],
 }
@@ -332,6 +333,7 @@ def test_calls_are_allowed_where_the_standard_says(mixed, function):
             "GetFMUState": (byref(c_void_p()),),
             "GetNumberOfVariableDependencies": (c_uint32(1), byref(c_size_t())),
             "GetDirectionalDerivative": nothing * 4,
+            "GetAdjointDerivative": nothing * 4,
             "GetOutputDerivatives": (*nothing, None, *nothing),
             "DoStep": (c_double(0), c_double(1e-6), c_bool(True), *flags, byref(c_double())),
         }
