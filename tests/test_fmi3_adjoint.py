@@ -1,9 +1,13 @@
 """Adjoint derivatives: the transpose of the directional ones, which are tested against differences."""
 
-from ctypes import c_double, c_size_t, c_uint32
+import ast
+import re
+from ctypes import c_size_t, c_uint32
+from pathlib import Path
 
 import numpy as np
 import pytest
+import tiefmu
 from fmi3_calls import ERROR, OK, Fmu, Instance
 from fmu_scenes import ALL_FREE, DRIVEN, MIXED, SETTINGS, extras, scene
 from port_scenes import line_of_slaves, ported
@@ -140,7 +144,7 @@ def test_it_changes_nothing_that_follows(fmu):
     outputs, inputs = fmu.names("output"), fmu.names("input")
     one, other = moved(fmu), moved(fmu)
     time = one.get("time")[0]
-    for k in range(3):
+    for _ in range(3):
         one.derivative("Adjoint", outputs, inputs, np.ones(sum(map(fmu.size, outputs))))
         for instance in (one, other):
             assert instance.step(time, 1e-3)[0] == OK
@@ -246,3 +250,16 @@ def test_not_in_the_middle_of_a_step(tmp_path):
     assert instance.step(0.0, 2.5 * instance.get("stable_time_step")[0])[0] == OK
     assert answers and set(answers) == {ERROR}
     instance.free()
+
+
+def test_the_examples_of_the_page(tmp_path, monkeypatch, capsys):
+    """FMPy runs both, and the gradient is that of a mean: the shares of all masters add up to one."""
+    page = (Path(__file__).parents[1] / "docs" / "fmi3.md").read_text()
+    use, adjoint = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
+    before, after = use.split("fmu.terminate()")
+    monkeypatch.chdir(tmp_path)
+    tiefmu.build(tiefmu.load(scene(np.random.default_rng(1), *DRIVEN)), "weld.fmu", fmi=3)
+    exec(before + adjoint + "fmu.terminate()" + after, {})
+    shares = ast.literal_eval(capsys.readouterr().out)
+    assert len(shares) == 10
+    np.testing.assert_allclose(sum(shares.values()), 1, rtol=1e-12)
