@@ -12,6 +12,7 @@ from typing import get_args
 import fmpy
 import numpy as np
 import pytest
+import scipy.signal
 import tiefmu
 from tiefmu.acceptance.criteria import TABLES, read
 from tiefmu.acceptance.judge import Judge
@@ -172,6 +173,29 @@ def test_a_filtered_limit(folder, result):
     found = one(folder, '[[limit]]\nsignal = "slave[1].v[3]"\nfilter = 180\nat_most = 1e9')
     assert found.value == pytest.approx(np.abs(v).max(), rel=1e-12)
     assert abs(found.value - np.abs(result["slave[1].v[3]"]).max()) > 1e-4 * found.value
+
+
+@pytest.mark.parametrize(
+    "signal, stems, combine",
+    [
+        ("slave[2].v", [["slave[2].v"]], None),
+        ("slave[*].v", [["slave[1].v", "slave[2].v"]], "norm"),
+        ("slave[*].v", [["slave[1].v"], ["slave[2].v"]], "largest"),
+    ],
+)
+def test_components_are_filtered_before_their_length_is_taken(folder, result, signal, stems, combine):
+    """SAE J211-1: before all that is not linear. Against SciPy's Butterworth filter of 2.0775 times the class."""
+    b, a = scipy.signal.butter(2, 2.0775 * 180, fs=1 / STEP)
+    length = int(np.ceil(3 / (180 * STEP)))
+
+    def smooth(values):
+        return scipy.signal.filtfilt(b, a, values, padlen=length)
+
+    first = max(norm({name: smooth(result[name]) for name in result.dtype.names}, of).max() for of in stems)
+    text = f'[[limit]]\nsignal = "{signal}"\nfilter = 180\nat_most = 1e9\n'
+    found = one(folder, text + (f'combine = "{combine}"' if combine else ""))
+    assert found.value == pytest.approx(first, rel=1e-9)
+    assert found.value != pytest.approx(max(np.abs(smooth(norm(result, of))).max() for of in stems), rel=1e-7)
 
 
 def test_both_sides_are_filtered(folder, result):
@@ -353,6 +377,28 @@ def test_the_example_of_ten_lines_with_fmpy_alone(example):
     assert subprocess.run(command, capture_output=True).returncode == 0
     Path("reference.csv").write_text("time,force\n0,0\n10,1\n")
     assert subprocess.run(command, capture_output=True).returncode == 1
+
+
+def test_a_run_that_stops_has_failed(example, capsys):
+    """Divergence is no bad input: exit status 1, the table and a JUnit file in which nothing has passed."""
+    Path("load.csv").write_text("time,slave[1].f[3]\n0,0\n0.005,1\n0.0051,1e300\n")
+    Path("weld.toml").write_text(Path("weld.toml").read_text().replace("mass = 1.0", 'mass = 1.0\nmotion = "free"'))
+    assert main(["accept", "weld.toml", "criteria.toml", "--junit", "out.xml", "--pictures", "pictures"]) == 1
+    out = capsys.readouterr().out
+    assert "weld.toml: stopped at t = 0.005" in out and out.endswith("10 criteria, 10 failed\n")
+    suite = ElementTree.parse("out.xml").getroot().find("testsuite")
+    assert suite.get("tests") == suite.get("failures") == "10"
+    cases = suite.findall("testcase")
+    assert [case.get("name") for case in cases][:2] == ["run", "share of master 3"]
+    assert [case.get("name") for case in cases][-2:] == ["dropped slaves", "half the step"]
+    assert all(case.find("failure") is not None for case in cases)
+
+
+def test_the_table_is_printed_whatever_becomes_of_the_files(example, built, capsys):
+    Path("taken").write_text("")
+    assert main(["accept", str(built), "criteria.toml", "--pictures", "taken"]) == 2
+    out, error = capsys.readouterr()
+    assert out.endswith("all 9 criteria passed\n") and error.startswith("error: taken: ")
 
 
 SIGNAL = 'signal = "master[1].f[3]"'

@@ -207,7 +207,7 @@ INPUTS = {
     "text": ("time,slave[1].f[3]\n0,x\n", "in.csv: line 2: slave[1].f[3]: expected a number, found 'x'"),
     "nan": ("time,slave[1].f[3]\n0,nan\n", "in.csv: line 2: slave[1].f[3]: nan is not a finite number"),
     "short row": ("time,slave[1].f[3]\n0,0\n1\n", "in.csv: line 3: expected 2 values, found 1"),
-    "empty": ("", "in.csv: is empty; expected a header with 'time' and names of inputs"),
+    "empty": ("", "in.csv: is empty; expected a header with 'time' and names of columns"),
     "header only": ("time\n", "in.csv: has no values below its header"),
     "ends at the start": ("time,slave[1].f[3]\n0,0\n", "in.csv: stop time 0 s is not after start time 0 s"),
     "missing": (None, "in.csv: no such file"),

@@ -2,7 +2,7 @@
 
 from ._core import Diverged, SceneError, StepTooLong
 
-__all__ = ["Diverged", "RunError", "SceneError", "StepTooLong", "UsageError"]
+__all__ = ["Diverged", "RunError", "RunStopped", "SceneError", "StepTooLong", "UsageError"]
 
 
 class UsageError(ValueError):
@@ -11,3 +11,7 @@ class UsageError(ValueError):
 
 class RunError(Exception):
     """A co-simulation that cannot start or did not finish."""
+
+
+class RunStopped(RunError):
+    """The FMU refused to go on."""

@@ -12,11 +12,12 @@ from typing import Any
 
 import numpy as np
 
-from .errors import RunError
+from .csv_table import one_line
+from .errors import RunError, RunStopped
 from .fmi3_variables import elements
 from .fmi_access import Access2, Access3, moving_pointer
 from .platforms import LibraryError, here, library_of
-from .signals import Experiment, one_line
+from .signals import Experiment
 
 LARGEST_BLOCK = 2**26  # bytes of rows handed on at a time
 INPUTS_AHEAD = 2**22  # bytes of inputs computed at a time
@@ -144,13 +145,13 @@ class Instance:
         self.access = Access3(self.instance, fmu.variables) if fmu.fmi == 3 else Access2(self.instance)
 
     @contextlib.contextmanager
-    def _errors(self, what: str):
+    def _errors(self, what: str, kind: type[RunError] = RunError):
         try:
             yield
         except Exception as error:
             message = one_line(self.said[-1] if self.said else error)
             self.said.clear()
-            raise RunError(f"{self.fmu.name}: {what}: {message}") from None
+            raise kind(f"{self.fmu.name}: {what}: {message}") from None
 
     def reset(self) -> None:
         """Back to where it was after its instantiation."""
@@ -174,7 +175,8 @@ class Instance:
     ) -> Iterator[np.ndarray]:
         """Runs it. Yields rows of time and outputs (rows, 1 + outputs), at the start and after each step, in blocks of
         at most `largest` bytes. finished(time) after each step. Row k holds what the FMU answers at the end of step k,
-        the inputs being those of the start of the step. Raises RunError."""
+        the inputs being those of the start of the step. Raises RunError, RunStopped of a
+        step."""
         inputs, time = plan.inputs, plan.start
         points = plan.points(self.fmu.description.coSimulation.canHandleVariableCommunicationStepSize)
         estimate = int(min(plan.rows, 1e15)) + 3
@@ -218,7 +220,7 @@ class Instance:
                     if finished:
                         finished(time)
             except Exception:
-                with self._errors(f"stopped at t = {time:g} s"):
+                with self._errors(f"stopped at t = {time:g} s", RunStopped):
                     raise
             row += len(ends)
             if row == len(block):

@@ -1,7 +1,5 @@
 """Inputs over time: read from a CSV, and their values at communication points as FMPy's `simulate_fmu` gives them."""
 
-import csv
-import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from math import isclose
@@ -10,57 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from .csv_table import SECONDS, read_table
 from .errors import RunError
 from .schema import suggestion
-
-
-def one_line(error) -> str:
-    return " ".join(str(error).split())
-
-
-def read_table(path: Path, check) -> tuple[list[str], np.ndarray]:
-    """Header and values (rows, columns) of a CSV with a column `time`, in the order of the file; finite numbers, times
-    that do not decrease. check(header) may refuse it. Raises RunError, which names the line."""
-    try:
-        with open(path, newline="", encoding="utf-8-sig") as file:
-            rows = [(reader.line_num, row) for reader in [csv.reader(file)] for row in reader if row]
-    except FileNotFoundError:
-        raise RunError(f"{path}: no such file") from None
-    except OSError as error:
-        raise RunError(f"{path}: {error.strerror}") from None
-    except (UnicodeDecodeError, csv.Error) as error:
-        raise RunError(f"{path}: not a CSV file: {one_line(error)}") from None
-    if not rows:
-        raise RunError(f"{path}: is empty; expected a header with 'time' and names of inputs")
-    header = [name.strip() for name in rows[0][1]]
-    if "time" not in header:
-        raise RunError(f"{path}: has no column 'time'; found {', '.join(header[:6])}")
-    repeated = next((name for name in header if header.count(name) > 1), None)
-    if repeated is not None:
-        raise RunError(f"{path}: column '{repeated}' is repeated")
-    check(header)
-    if len(rows) < 2:
-        raise RunError(f"{path}: has no values below its header")
-
-    table = np.empty((len(rows) - 1, len(header)))
-    for k, (line, row) in enumerate(rows[1:]):
-        if len(row) != len(header):
-            raise RunError(f"{path}: line {line}: expected {len(header)} values, found {len(row)}")
-        for column, value in enumerate(row):
-            try:
-                table[k, column] = float(value)
-            except ValueError:
-                raise RunError(f"{path}: line {line}: {header[column]}: expected a number, found '{value}'") from None
-            if not math.isfinite(table[k, column]):
-                raise RunError(f"{path}: line {line}: {header[column]}: {value} is not a finite number")
-    time = table[:, header.index("time")]
-    back = np.flatnonzero(np.diff(time) < 0)
-    if len(back):
-        raise RunError(
-            f"{path}: line {rows[back[0] + 2][0]}: time goes back from {time[back[0]]:g} to "
-            f"{time[back[0] + 1]:g} s; times must not decrease"
-        )
-    return header, table
 
 
 def read_inputs(path: Path, variables: dict[str, Any]) -> np.ndarray:
@@ -79,7 +29,10 @@ def read_inputs(path: Path, variables: dict[str, Any]) -> np.ndarray:
             if not is_continuous(variables[name]):
                 raise RunError(f"{path}: column '{name}': only continuous inputs of type Real can be given")
 
-    header, table = read_table(path, check)
+    found = read_table(path, check)
+    if SECONDS.get(found.unit, 1.0) != 1.0:
+        raise RunError(f"{path}: times are in {found.unit}; inputs are over s")
+    header, table = found.names, found.values
     order = ["time"] + [name for name in header if name != "time"]
     signals = np.empty(len(table), dtype=[(name, float) for name in order])
     for name in order:

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from .. import run as running
 from ..arguments import check_folder_of, positive
-from ..errors import UsageError
+from ..errors import RunStopped, UsageError
 from ..fmu_instance import Fmu, Instance
 from ..models import fmu_of
 from . import junit, pictures
@@ -52,22 +52,24 @@ def run_accept(options: argparse.Namespace) -> int:
         try:
             with running.progress(plan) as bar:
                 judgement = judge.judge(instance, plan, bar)
+        except RunStopped as error:
+            judgement = judge.stopped(str(error))
         finally:
             instance.free()
+    print(*table(options.model, judge.criteria.title, judgement), sep="\n")
     if options.junit:
-        junit.write(options.junit, Path(options.model).stem, judgement.verdicts, judgement.result.seconds)
+        seconds = judgement.result.seconds if judgement.result else 0.0
+        junit.write(options.junit, Path(options.model).stem, judgement.verdicts, seconds)
     if options.pictures:
         pictures.draw(judgement.verdicts, options.pictures)
-    print(*table(options.model, judge.criteria.title, judgement), sep="\n")
     return 0 if judgement.passed else 1
 
 
 def table(model: str, title: str, judgement: Judgement) -> list[str]:
     result, verdicts = judgement.result, judgement.verdicts
-    lines = [
-        f"{model}: {title + ': ' if title else ''}{result.steps} steps to t = {result.last[0]:g} s in "
-        f"{result.seconds:.3g} s"
-    ]
+    lines = [f"{model}: {title}" if title else model]
+    if result:
+        lines[0] += f": {result.steps} steps to t = {result.last[0]:g} s in {result.seconds:.3g} s"
     width = max(len(verdict.name) for verdict in verdicts)
     for verdict in verdicts:
         word = "passed" if verdict.passed else "FAILED"

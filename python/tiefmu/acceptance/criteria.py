@@ -61,6 +61,7 @@ class Against(Criterion):
 
     reference: Name
     column: Name | None = None  # None: named like the signal
+    time_column: Name = "time"
     scale: Number = 1.0
     time_scale: Positive = 1.0
     filter_reference: bool = True
@@ -97,6 +98,17 @@ class Limit(Criterion):
         return self
 
 
+HEALTH = {  # key: name of the criterion
+    "energy_residual": "energy residual",
+    "drift": "drift",
+    "power_residual": "power residual",
+    "stability_margin": "stability margin",
+    "added_mass": "added mass",
+    "dropped": "dropped slaves",
+    "half_step": "half the step",
+}
+
+
 class Health(Table):
     energy_residual: NotNegative | None = None
     drift: NotNegative | None = None
@@ -131,6 +143,12 @@ class Criteria(Table):
             for number, row in enumerate(getattr(self, key), 1):
                 rows.append((row.name or f"{key} {number}", row))
         return rows
+
+    @property
+    def labels(self) -> list[str]:
+        """Names of all criteria."""
+        given = [HEALTH[key] for key in HEALTH if getattr(self.health, key) is not None]
+        return [name for name, _ in self.named] + given
 
 
 TABLES: dict[str, type[Table]] = {"run": Run, "band": Band, "rating": Rating, "limit": Limit, "health": Health}

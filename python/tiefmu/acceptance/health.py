@@ -6,12 +6,12 @@ import re
 import numpy as np
 
 from .. import key_figures
-from ..errors import RunError, UsageError
+from ..errors import RunStopped, UsageError
 from ..fmu_instance import Fmu
 from ..report import of_folder
 from ..results import Result
 from ..signals import Experiment
-from .criteria import Health
+from .criteria import HEALTH, Health
 from .verdict import Curve, Verdict
 
 MOTION = re.compile(r"(\w+)\[.*\]\.([vwft])\[[123]\]")  # what a run at half the step is compared by
@@ -44,16 +44,16 @@ def verdicts(health: Health, fmu: Fmu, plan: Experiment, result: Result, half: R
     if health.energy_residual is not None:
         scale = key_figures.energy_scale(result) or 1.0
         worst, curve = result.largest("energy.residual") / scale, result["energy.residual"] / scale
-        found.append(over_time("energy residual", worst, health.energy_residual, "1", result, curve))
+        found.append(over_time(HEALTH["energy_residual"], worst, health.energy_residual, "1", result, curve))
         found[-1].where = "largest residual over largest energy"
     if health.drift is not None:
-        found.append(over_time("drift", result.largest("drift"), health.drift, "m", result, result["drift"]))
+        found.append(over_time(HEALTH["drift"], result.largest("drift"), health.drift, "m", result, result["drift"]))
         found[-1].where = "largest change of an offset's length"
     if health.power_residual is not None:
         scale = power_scale(result)
         curve = result["power_residual"] / max(scale, 1e-300)
         worst = result.largest("power_residual") / max(scale, 1e-300)
-        found.append(over_time("power residual", worst, health.power_residual, "1", result, curve))
+        found.append(over_time(HEALTH["power_residual"], worst, health.power_residual, "1", result, curve))
         found[-1].where = "over largest force times largest velocity"
     if health.stability_margin is not None:
         found.append(stability(health.stability_margin, fmu, plan, result))
@@ -62,7 +62,7 @@ def verdicts(health: Health, fmu: Fmu, plan: Experiment, result: Result, half: R
     if health.dropped is not None:
         count = len(report(fmu, "dropped")["dropped"])
         found.append(
-            Verdict("dropped slaves", "health", count, count <= health.dropped, f"at most {health.dropped}", "1")
+            Verdict(HEALTH["dropped"], "health", count, count <= health.dropped, f"at most {health.dropped}", "1")
         )
         found[-1].bars = [("dropped", float(count)), ("tied", float(len(report(fmu, "dropped")["slaves"])))]
     if half is not None and health.half_step is not None:
@@ -109,7 +109,7 @@ def stability(least: float, fmu: Fmu, plan: Experiment, result: Result) -> Verdi
     margin = 1 - plan.step / count / limit
     worst = int(np.argmin(margin))
     return Verdict(
-        "stability margin",
+        HEALTH["stability_margin"],
         "health",
         float(margin[worst]),
         bool(margin[worst] >= least),
@@ -130,7 +130,9 @@ def added_mass(most: float, fmu: Fmu) -> Verdict:
     ratios = [(ratio(row["added_mass"], row["mass"]), row["id"]) for row in rows]
     worst, node = max(ratios, default=(0.0, 0))
     bare = f"node {node} has no own mass in the scene" if worst == math.inf else f"node {node}"
-    verdict = Verdict("added mass", "health", worst, worst <= most, f"at most {most:g} of the own mass", "1", bare)
+    verdict = Verdict(
+        HEALTH["added_mass"], "health", worst, worst <= most, f"at most {most:g} of the own mass", "1", bare
+    )
     verdict.bars = [(f"node {i}", part) for part, i in sorted(ratios, reverse=True)[:20] if part < math.inf]
     verdict.axis, verdict.limits = "added over own mass [1]", [most]
     return verdict
@@ -161,13 +163,13 @@ def half_step(most: float, result: Result, half: Result) -> Verdict:
         scale = float(np.linalg.norm(b))
         error = float(np.linalg.norm(a - b)) / scale if scale > 0 else float(np.linalg.norm(a))
         if not np.isfinite(error):
-            raise RunError(f"half_step: {kind} holds values that are not finite")
+            raise RunStopped(f"half_step: {kind} holds values that are not finite")
         if error >= worst:
             largest = float(np.sqrt((b**2).sum(axis=0)).max())
             worst, what = error, kind
             curve = np.sqrt(((a - b) ** 2).sum(axis=0)) / max(largest, 1e-300)
     return Verdict(
-        "half the step",
+        HEALTH["half_step"],
         "health",
         worst,
         worst <= most,

@@ -1,6 +1,7 @@
 """Runs an FMU and judges it: a verdict per criterion."""
 
 import contextlib
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -8,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import RunError, UsageError
+from ..errors import RunError, RunStopped, UsageError
 from ..fmu_instance import Fmu, Instance
 from ..results import Result
 from ..run import experiment, simulate
@@ -21,8 +22,10 @@ from .verdict import Curve, Verdict
 
 @dataclass
 class Judgement:
+    """result: None of a run that stopped."""
+
     verdicts: list[Verdict]
-    result: Result
+    result: Result | None
 
     @property
     def passed(self) -> bool:
@@ -68,8 +71,10 @@ class Judge:
     def judge(
         self, instance: Instance, plan: Experiment, bar: Any = None, start_values: dict[str, float] | None = None
     ) -> Judgement:
-        """Runs the instance, which has the outputs of this judge; a second time, reset, for `half_step`."""
-        collected = Collected([quantity for _, _, quantity in self.rows], self.outputs)
+        """Runs the instance, which has the outputs of this judge; a second time, reset, for `half_step`. Raises
+        UsageError, RunError; RunStopped where the run does not reach its end or leaves no numbers."""
+        in_parts = [row.filter is not None for _, row, _ in self.rows]
+        collected = Collected([quantity for _, _, quantity in self.rows], in_parts, self.outputs)
         result = simulate(instance, plan, self.outputs, [collected], bar, start_values)
         time, signals = collected.signals()
         verdicts = []
@@ -87,11 +92,20 @@ class Judge:
             raise UsageError(f"{self.name}: health: {error}") from None
         return Judgement(verdicts, result)
 
+    def stopped(self, message: str) -> Judgement:
+        """Of a run that RunStopped: all has failed."""
+        verdicts = [Verdict("run", "run", math.nan, False, "reaches its end", "", message)]
+        kinds = {label: type(row).__name__.lower() for label, row, _ in self.rows}
+        verdicts += [
+            Verdict(label, kinds.get(label, "health"), math.nan, False, "not judged") for label in self.criteria.labels
+        ]
+        return Judgement(verdicts, None)
+
     def _one(self, label: str, row: Criterion, quantity: Quantity, time: np.ndarray, values: np.ndarray) -> Verdict:
         unit = self.fmu.unit(quantity.names[0])
         if not np.isfinite(values).all():
-            raise RunError(f"signal '{row.signal}': holds values that are not finite")
-        points, given = prepared(row, time, values), self.references[label]
+            raise RunStopped(f"signal '{row.signal}': holds values that are not finite")
+        points, given = prepared(row, quantity, time, values), self.references[label]
         if isinstance(row, Limit):
             verdict = limit(label, row, unit, *points)
         else:

@@ -17,7 +17,8 @@ def write(path: Path, name: str, verdicts: list[Verdict], seconds: float) -> Non
         case = ElementTree.SubElement(
             suite, "testcase", {"name": verdict.name, "classname": f"{name}.{verdict.kind}", "time": "0"}
         )
-        said = f"{verdict.value!r} {verdict.unit}; asked: {verdict.asked}; {verdict.where}"
+        unit = f" {verdict.unit}" if verdict.unit not in ("", "1") else ""
+        said = "; ".join(filter(None, [f"{verdict.value!r}{unit}", f"asked: {verdict.asked}", verdict.where]))
         if not verdict.passed:
             ElementTree.SubElement(case, "failure", {"message": said, "type": verdict.kind}).text = said
         ElementTree.SubElement(case, "system-out").text = said

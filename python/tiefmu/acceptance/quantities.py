@@ -5,10 +5,10 @@ from pathlib import Path
 
 import numpy as np
 
+from ..csv_table import SECONDS, read_table
 from ..errors import RunError, UsageError
 from ..results import needed
 from ..schema import suggestion
-from ..signals import read_table
 from .criteria import Against, Criterion
 
 Points = tuple[np.ndarray, np.ndarray]  # times and values
@@ -41,15 +41,18 @@ class Quantity:
         self.names = [name for item in self.items for name in item]
         self.signed = len(self.items[0]) == 1 and (len(self.items) == 1 or combine == "sum")
 
-    def of(self, rows: np.ndarray, columns: dict[str, int]) -> np.ndarray:
-        """(rows,)"""
+    def parts(self, rows: np.ndarray, columns: dict[str, int]) -> np.ndarray:
+        """What is linear in the outputs: their components, or the sum of them, (rows, items, components)."""
         values = rows[:, [[columns[name] for name in item] for item in self.items]]
-        if self.combine == "sum" or len(self.items) == 1:
-            total = values.sum(axis=1)
-            return total[:, 0] if self.signed else np.sqrt((total**2).sum(axis=1))
-        if self.combine == "norm":
-            return np.sqrt((values**2).sum(axis=(1, 2)))
-        return np.sqrt((values**2).sum(axis=2).max(axis=1))
+        return values.sum(axis=1, keepdims=True) if self.combine == "sum" else values
+
+    def whole(self, parts: np.ndarray) -> np.ndarray:
+        """The quantity of such parts, (rows,)."""
+        if self.signed:
+            return parts[:, 0, 0]
+        if self.combine == "norm" or parts.shape[1] == 1:
+            return np.sqrt((parts**2).sum(axis=(1, 2)))
+        return np.sqrt((parts**2).sum(axis=2).max(axis=1))
 
 
 def vector(stem: str) -> list[str]:
@@ -57,27 +60,30 @@ def vector(stem: str) -> list[str]:
 
 
 class Collected:
-    """Takes the rows of a run block by block and keeps the time and one number a row of each quantity."""
+    """Takes the rows of a run block by block and keeps the time and one number a row of each quantity, or its parts
+    where they will be filtered."""
 
-    def __init__(self, quantities: list[Quantity], names: list[str]):
-        self.quantities, self.columns = quantities, {name: 1 + k for k, name in enumerate(names)}
+    def __init__(self, quantities: list[Quantity], in_parts: list[bool], names: list[str]):
+        self.quantities, self.in_parts = quantities, in_parts
+        self.columns = {name: 1 + k for k, name in enumerate(names)}
         self.parts: list[list[np.ndarray]] = [[] for _ in range(1 + len(quantities))]
 
     def write(self, block: np.ndarray) -> None:
         self.parts[0].append(block[:, 0].copy())
-        for part, quantity in zip(self.parts[1:], self.quantities):
-            part.append(quantity.of(block, self.columns))
+        for kept, quantity, in_parts in zip(self.parts[1:], self.quantities, self.in_parts):
+            found = quantity.parts(block, self.columns)
+            kept.append(found if in_parts else quantity.whole(found))
 
     def signals(self) -> tuple[np.ndarray, list[np.ndarray]]:
-        """Times, and values of each quantity."""
-        time, *values = (np.concatenate(part) for part in self.parts)
+        """Times, and values or parts of each quantity."""
+        time, *values = (np.concatenate(kept) for kept in self.parts)
         return time, values
 
 
 def filtered(time: np.ndarray, values: np.ndarray, frequency_class: int) -> Points:
-    """Times and values behind a filter of SAE J211-1 (appendix C: Butterworth of second order, forwards and backwards,
-    no phase), at equal steps: the mean step where those given are not. Ends are continued by their point reflection.
-    Raises UsageError where the steps are too long for the class or scipy is missing."""
+    """Times and values (rows, ...) behind a filter of SAE J211-1 (appendix C: Butterworth of second order, forwards and
+    backwards, no phase), at equal steps: the mean step where those given are not. Ends are continued by their point
+    reflection. Raises UsageError where the steps are too long for the class or scipy is missing."""
     needed("scipy", "accept", f"filter = {frequency_class}")
     from scipy.signal import filtfilt
 
@@ -90,10 +96,12 @@ def filtered(time: np.ndarray, values: np.ndarray, frequency_class: int) -> Poin
         )
     equal = time[0] + step * np.arange(len(time))
     if not np.allclose(time, equal, rtol=0, atol=1e-6 * step):
-        values, time = np.interp(equal, time, values), equal
+        flat = values.reshape(len(time), -1)
+        even = np.stack([np.interp(equal, time, column) for column in flat.T], axis=1)
+        values, time = even.reshape(values.shape), equal
     forward, back = coefficients(frequency_class, step)
     reflected = min(len(values) - 1, int(np.ceil(3 / (frequency_class * step))))
-    return time, filtfilt(forward, back, values, padtype="odd", padlen=reflected)
+    return time, filtfilt(forward, back, values, axis=0, padtype="odd", padlen=reflected)
 
 
 def coefficients(frequency_class: int, step: float) -> tuple[np.ndarray, np.ndarray]:
@@ -118,10 +126,12 @@ def cut(time: np.ndarray, values: np.ndarray, window: tuple[float, float] | None
     return time[inside], values[inside]
 
 
-def prepared(row: Criterion, time: np.ndarray, values: np.ndarray) -> Points:
-    """The signal of the run as the criterion looks at it: filtered, then cut."""
+def prepared(row: Criterion, quantity: Quantity, time: np.ndarray, values: np.ndarray) -> Points:
+    """The signal of the run as the criterion looks at it: its parts filtered, as SAE J211-1 wants it before all that is
+    not linear, then one number a row, then cut."""
     if row.filter is not None:
-        time, values = filtered(time, values, row.filter)
+        time, parts = filtered(time, values, row.filter)
+        values = quantity.whole(parts)
     return cut(time, values, row.window)
 
 
@@ -132,12 +142,15 @@ def reference(row: Against, folder: Path) -> Points:
 
     def check(header):
         if column not in header:
-            others = [name for name in header if name != "time"]
+            others = [name for name in header if name not in ("", row.time_column)]
             raise RunError(f"{path}: has no column '{column}'{suggestion(column, others)}")
 
-    header, table = read_table(path, check)
-    time = table[:, header.index("time")] * row.time_scale
-    values = table[:, header.index(column)] * row.scale
+    table = read_table(path, check, [column], row.time_column, "; time_column says which holds the times")
+    seconds = SECONDS.get(table.unit, row.time_scale)
+    if abs(seconds - row.time_scale) > 1e-6 * seconds:
+        raise UsageError(f"{path}: its times are in {table.unit}: time_scale = {seconds:g}, found {row.time_scale:g}")
+    time = table.values[:, table.names.index(row.time_column)] * row.time_scale
+    values = table.values[:, table.names.index(column)] * row.scale
     if len(time) < 2:
         raise UsageError(f"{path}: holds one row only; a reference needs two")
     if row.filter is not None and row.filter_reference:

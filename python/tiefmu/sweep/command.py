@@ -10,8 +10,10 @@ from pathlib import Path
 from typing import Any
 
 from ..acceptance import command as acceptance
+from ..acceptance.criteria import read as read_criteria
 from ..arguments import check_folder_of, whole
-from ..errors import RunError, UsageError
+from ..decks import is_deck
+from ..errors import RunError, SceneError, UsageError
 from ..results import needed
 from ..scene import read_toml
 from . import table, worker
@@ -20,6 +22,7 @@ from .journal import Journal
 
 BATCH = 100  # cases a task at most: the scheduler's part of a case stays below 0.1 ms
 AHEAD = 4  # tasks a worker waiting, so that 1e6 cases need no memory
+TRIED = 10  # variants that may fail before the sweep is given up, if no other was built
 RETRIES = 3  # of the cases of a worker that died
 
 
@@ -46,6 +49,7 @@ def run_sweep(options: argparse.Namespace) -> int:
     sweep = read(options.sweep)
     table.check(options.output, bool(sweep.signals))
     todo = cases(sweep, name)
+    check_columns(sweep, folder, name)
     task = shared(sweep, folder, name)
     raw, files = scene_of(sweep, folder)
     first_variant(raw, files, task, sweep, todo, name)
@@ -75,6 +79,17 @@ def run_sweep(options: argparse.Namespace) -> int:
     return 0
 
 
+def check_columns(sweep: Sweep, folder: Path, name: str) -> None:
+    """Raises UsageError where two columns of the table would have the same name."""
+    criteria = read_criteria(folder / sweep.criteria).labels if sweep.criteria else []
+    names = [("parameter", p.title) for p in sweep.parameter] + [("criterion", label) for label in criteria]
+    seen = dict.fromkeys(("case", "passed", "time", "message"), "column") | dict.fromkeys(sweep.signals, "signal")
+    for kind, label in names:
+        if label in seen:
+            raise UsageError(f"{name}: {kind} '{label}': the table has a {seen[label]} of that name; name it otherwise")
+        seen[label] = kind
+
+
 def shared(sweep: Sweep, folder: Path, name: str) -> worker.Task:
     criteria = {}
     if sweep.criteria:
@@ -89,28 +104,46 @@ def shared(sweep: Sweep, folder: Path, name: str) -> worker.Task:
 
 
 def scene_of(sweep: Sweep, folder: Path) -> tuple[dict | bytes, dict[str, bytes]]:
-    """The scene as tables, with the files it names; or the FMU."""
+    """The scene as tables, with the files that it or a parameter names; or the FMU. Raises UsageError."""
     path = folder / sweep.scene
     if path.suffix.lower() == ".fmu":
         return path.read_bytes(), {}
-    raw = read_toml(path)
+    if is_deck(path):
+        raise UsageError(f"{path}: is a deck, which has no keys that vary; tiefmu import makes a scene of it")
+    try:
+        raw = read_toml(path)
+    except SceneError as error:
+        raise UsageError(f"{path}: {error}") from None
     mesh = raw.get("mesh", {}) if isinstance(raw.get("mesh"), dict) else {}
-    named = [mesh[key] for key in ("file", "properties") if isinstance(mesh.get(key), str)]
-    return raw, {file: (path.parent / file).read_bytes() for file in named if (path.parent / file).is_file()}
+    named = [mesh.get(key) for key in worker.MESH_FILES]
+    for parameter in sweep.parameter:
+        if parameter.scene in [f"mesh.{key}" for key in worker.MESH_FILES]:
+            named += parameter.values or []
+    given = [file for file in named if isinstance(file, str) and (path.parent / file).is_file()]
+    return raw, {file: (path.parent / file).read_bytes() for file in given}
 
 
 def first_variant(raw: dict | bytes, files: dict, task: worker.Task, sweep: Sweep, todo: list[Case], name: str) -> None:
-    """What is wrong with all cases is said before any runs. Raises UsageError."""
-    data: bytes | str
-    if isinstance(raw, bytes):
-        data = raw
-    else:
-        try:
-            data = worker.build_variant(variant(raw, sweep, todo[0].values), files)
-        except UsageError as error:
-            raise UsageError(f"{name}: parameter {error}") from None
+    """What is wrong with all cases, or with the first TRIED variants, is said before any runs. Raises UsageError."""
+    data: bytes | str = raw if isinstance(raw, bytes) else ""
+    if not isinstance(raw, bytes):
+        message, tried = "", set()
+        for case in todo:
+            key = scene_key(sweep, case)
+            if key in tried:
+                continue
+            if len(tried) == TRIED:
+                break
+            tried.add(key)
+            try:
+                data = worker.build_variant(variant(raw, sweep, case.values), files)
+            except UsageError as error:
+                raise UsageError(f"{name}: parameter {error}") from None
+            if isinstance(data, bytes):
+                break
+            message = message or f"{name}: case {case.number}: {data}"
     if isinstance(data, str):
-        raise UsageError(f"{name}: case 0: {data}")
+        raise UsageError(message)
     try:
         worker.Ready(data, task).close()
     except (UsageError, RunError) as error:

@@ -1,6 +1,7 @@
 """The table of a sweep: a row a case, in the order of the cases."""
 
 import csv
+import json
 from pathlib import Path
 
 from ..errors import UsageError
@@ -19,8 +20,15 @@ def check(path: Path, signals: bool) -> None:
         needed("pyarrow", "sweep", path)
 
 
+def alike(values: list) -> list:
+    """A column has one type: values of several become their text, as JSON has it."""
+    kinds = {float if type(value) is int else type(value) for value in values}
+    return values if len(kinds) < 2 and not kinds & {list, dict} else [json.dumps(value) for value in values]
+
+
 def write(path: Path, parameters: dict[str, list], rows: list[dict]) -> None:
     """parameters: title -> a value a case; rows: what a case gave; a number that it did not give is missing."""
+    parameters = {name: alike(values) for name, values in parameters.items()}
     names = list(dict.fromkeys(name for row in rows for name in row if name not in ("message", "passed")))
     columns: dict[str, list] = {"case": list(range(len(rows))), **parameters}
     if any("passed" in row for row in rows):

@@ -19,6 +19,7 @@ from ..run import experiment, simulate
 from ..schema import suggestion
 from ..signals import Experiment
 
+MESH_FILES = ("file", "properties")  # keys of [mesh] that name files
 KEPT = 16  # unpacked FMUs that a thread of a worker holds
 _here = threading.local()  # an instance belongs to one thread
 
@@ -31,10 +32,15 @@ def given(data):
 def build_variant(raw: dict, files: dict[str, bytes]) -> bytes | str:
     """The FMU of a scene as bytes, or the message of what is wrong with it. files: what the scene names."""
     with tempfile.TemporaryDirectory(prefix="tiefmu-") as folder:
-        for name, data in files.items():
-            path = Path(folder) / name
-            path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_bytes(data)
+        places = {}  # none outside the folder, wherever the scene has its files
+        for number, (name, data) in enumerate(files.items()):
+            places[name] = f"{number}/{Path(name).name}"
+            (Path(folder) / str(number)).mkdir()
+            (Path(folder) / places[name]).write_bytes(data)
+        if isinstance(raw.get("mesh"), dict):
+            named = {key: raw["mesh"].get(key) for key in MESH_FILES}
+            moved = {key: places[name] for key, name in named.items() if isinstance(name, str) and name in places}
+            raw = raw | {"mesh": raw["mesh"] | moved}
         try:
             scene = load(raw, folder=Path(folder))
             return build(scene, Path(folder) / "variant.fmu").read_bytes()
@@ -122,6 +128,7 @@ class Ready:
                 judgement = self.judge.judge(self.instance, plan, start_values=start_values)
                 row["passed"] = judgement.passed
                 row |= {verdict.name: float(verdict.value) for verdict in judgement.verdicts}
+                assert judgement.result
                 result = judgement.result
             else:
                 result = simulate(self.instance, plan, self.outputs, start_values=start_values)
