@@ -1,6 +1,7 @@
 """`tiefmu sweep`: cases, rows against single runs, any number of workers, workers that die, going on."""
 
 import json
+import os
 import signal
 import subprocess
 import sys
@@ -14,7 +15,7 @@ import pytest
 import tiefmu
 from tiefmu.cli import main
 from tiefmu.run import run
-from tiefmu.sweep import command, design, worker
+from tiefmu.sweep import command, design, table, worker
 
 SCENE = """
 [mesh]
@@ -181,6 +182,44 @@ def test_a_variant_that_cannot_be_built_is_a_row_with_its_message(folder):
     assert not any(row["message"] for row in found[:6])
 
 
+def test_files_of_the_mesh_may_lie_anywhere(folder, tmp_path_factory):
+    """Beside the sweep or not, and as what varies; workers write nothing outside their own folders."""
+    far = tmp_path_factory.mktemp("far")
+    plate = "*NODE\n1,0,0,0\n2,%s,0,0\n3,%s,0.1,0\n4,0,0.1,0\n9,0.03,0.06,0.04\n*ELEMENT, TYPE=S4\n1,1,2,3,4\n"
+    (far / "plate.inp").write_text(plate % (0.1, 0.1))
+    Path("wide.inp").write_text(plate % (0.2, 0.2))
+    scene = SCENE.replace(SCENE[SCENE.index("nodes = [[") : SCENE.index("[[node]]")], 'file = "plate.inp"\n')
+    Path("plate.toml").write_text(scene)
+    before = {path: path.read_bytes() for path in [far / "plate.inp", Path("wide.inp")]}
+    up = f"../{os.path.relpath(far, folder.parent)}/plate.inp"
+    text = SWEEP.replace('"node[2].mass"', '"mesh.file"').replace(
+        "[0.1, 0.3]", json.dumps([up, str(far / "plate.inp")])
+    )
+    same = in_this_process(text)
+    assert not any(row["message"] for row in same)
+    assert same[:6] == same[6:]
+    wide = in_this_process(text.replace(json.dumps(up), '"wide.inp"'))
+    assert wide[6:] == same[6:] and wide[0]["peak"] != same[0]["peak"]
+    assert before == {path: path.read_bytes() for path in before}
+
+
+def test_a_first_variant_that_cannot_be_built(folder, capsys):
+    """Is a row as any other; that none of the first can be built is said at once."""
+    Path("sweep.toml").write_text(SWEEP.replace("[0.1, 0.3]", "[-1.0, 0.3]"))
+    assert main(["sweep", "sweep.toml", "-o", "out.parquet", "--workers", "1"]) == 0
+    assert "12 cases, 4 failed their criteria, 6 stopped" in capsys.readouterr().out
+    assert ["mass: -1 is negative" in row["message"] for row in rows()] == [True] * 6 + [False] * 6
+
+
+def test_columns_of_several_types(tmp_path):
+    """Numbers stay numbers, words words; what mixes them, and lists, are text that JSON reads back."""
+    parameters = {"m": [1, 0.5], "w": ["a", "b"], "b": [True, False], "mixed": ["a", 1], "k": [[1, 2, 3], 4.0]}
+    table.write(tmp_path / "out.parquet", parameters, [{"message": "", "x": 1.0}, {"message": "stopped"}])
+    found = pyarrow.parquet.read_table(tmp_path / "out.parquet").to_pydict()
+    assert (found["m"], found["w"], found["b"], found["x"]) == ([1.0, 0.5], ["a", "b"], [True, False], [1.0, None])
+    assert [json.loads(text) for text in found["mixed"] + found["k"]] == ["a", 1, [1, 2, 3], 4.0]
+
+
 def test_an_fmu_in_place_of_a_scene(folder):
     tiefmu.build(tiefmu.load("plate.toml"), folder / "plate.fmu")
     text = SWEEP.replace("plate.toml", "plate.fmu").replace('scene = "node[2].mass"', 'start = "master[1].f_ext[3]"')
@@ -220,6 +259,55 @@ def test_going_on_after_an_interruption(folder, monkeypatch, capsys):
     journal.write_text(json.dumps({"sweep": "another"}) + "\n")
     assert main(["sweep", "sweep.toml", "-o", "out.parquet", "--resume"]) == 2
     assert "is of another sweep" in capsys.readouterr().err
+
+
+def test_ctrl_c_says_how_to_go_on(folder):
+    """As a terminal does it: to all processes of the sweep. One line, no traceback of a worker."""
+    Path("sweep.toml").write_text(SWEEP.replace("[0.5, 1.0, 2.0]", str([0.1 * k for k in range(1, 601)])))
+    sweep = subprocess.Popen(
+        [sys.executable, "-m", "tiefmu.cli", "sweep", "sweep.toml", "-o", "out.parquet", "--workers", "1"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+    try:
+        wait_for(lambda: journal_rows() > 10 or sweep.poll() is not None)
+        os.killpg(sweep.pid, signal.SIGINT)
+        out, error = sweep.communicate(timeout=120)
+    finally:
+        if sweep.poll() is None:
+            os.killpg(sweep.pid, signal.SIGKILL)
+    assert (sweep.returncode, out) == (130, "")
+    done = journal_rows()
+    assert error == f"out.parquet: interrupted, {done} of 2400 cases are finished; --resume goes on with the others\n"
+
+
+def test_finished_cases_are_not_thrown_away(folder, capsys):
+    """Without --resume, with a damaged journal."""
+    journal = Path(".out.parquet.journal")
+    journal.write_text('{"sweep": "x"}\n[0, {"peak": 1.0, "message": ""}]\n')
+    before = journal.read_bytes()
+    assert main(["sweep", "sweep.toml", "-o", "out.parquet"]) == 2
+    assert capsys.readouterr().err == (
+        "error: .out.parquet.journal: holds 1 finished cases of an interrupted sweep; --resume goes on with them, "
+        "without this file it starts anew\n"
+    )
+    for damaged in (b"\xff\n", b"[]\n", b"7\n", b'["x", {}]\n', b'[1, "x"]\n'):
+        sweep = design.read(Path("sweep.toml"))
+        raw, files = command.scene_of(sweep, Path())
+        todo = design.cases(sweep, "sweep.toml")
+        key = command.digest(command.shared(sweep, Path(), "sweep.toml"), raw, files, todo)
+        journal.write_bytes(json.dumps({"sweep": key}).encode() + b"\n" + damaged)
+        assert main(["sweep", "sweep.toml", "-o", "out.parquet", "--resume"]) == 2
+        assert capsys.readouterr().err == (
+            "error: .out.parquet.journal: line 2: is damaged; remove it to lose but its case\n"
+        )
+        assert journal.read_bytes().endswith(damaged)
+    journal.write_bytes(before)
+    assert main(["sweep", "sweep.toml", "-o", "out.parquet", "--resume"]) == 2
+    assert "is of another sweep" in capsys.readouterr().err
+    assert journal.read_bytes() == before
 
 
 def test_a_worker_that_is_killed_in_mid_sweep(folder):
@@ -337,6 +425,18 @@ WRONG = [
     (
         f'{HEAD}[[parameter]]\nscene = "node[2].mass"\nvalues = [-1]',
         "case 0: scene: node table 2: mass: -1 is negative; it must be 0 or more",
+    ),
+    (
+        f'{HEAD}{FIRST}name = "peak"\nvalues = [1]',
+        "criterion 'peak': the table has a parameter of that name; name it otherwise",
+    ),
+    (
+        f'{HEAD}{FIRST}name = "message"\nvalues = [1]',
+        "parameter 'message': the table has a column of that name; name it otherwise",
+    ),
+    (
+        f'{HEAD}signals = ["slave[1].v[3]"]\n{FIRST}name = "slave[1].v[3]"\nvalues = [1]',
+        "parameter 'slave[1].v[3]': the table has a signal of that name; name it otherwise",
     ),
     (f'scene = "no.toml"\nsignals = ["x"]\n{FIRST}values = [1]', "no.toml: no such file beside it"),
 ]  # fmt: skip

@@ -5,6 +5,8 @@ import contextlib
 import hashlib
 import json
 import logging
+import signal
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -61,6 +63,13 @@ def run_sweep(options: argparse.Namespace) -> int:
         if left:
             with client(options.scheduler, options.workers) as connected:
                 run_cases(connected, sweep, task, raw, files, left, len(todo), journal)
+    except KeyboardInterrupt:
+        print(
+            f"{options.output}: interrupted, {len(journal.rows)} of {len(todo)} cases are finished; --resume goes on "
+            "with the others",
+            file=sys.stderr,
+        )
+        raise
     finally:
         journal.close()
         if not journal.rows:
@@ -181,14 +190,30 @@ def client(scheduler: str | None, workers: int | None) -> Iterator[Any]:
             except OSError as error:
                 raise UsageError(f"--scheduler {scheduler}: {error or 'no answer'}") from None
             return
-        with (
-            LocalCluster(
+        with sheltered():
+            cluster = LocalCluster(
                 n_workers=workers, threads_per_worker=1, processes=True, dashboard_address="127.0.0.1:0",
                 silence_logs=logging.CRITICAL,
-            ) as cluster,
-            Client(cluster) as connected,
-        ):  # fmt: skip
+            )  # fmt: skip
+        with cluster, Client(cluster) as connected:
             yield connected
+
+
+@contextlib.contextmanager
+def sheltered() -> Iterator[None]:
+    """Ctrl-C is for this process, which ends its workers: threads and processes begun inside never see it, this thread
+    sees it afterwards."""
+    if not hasattr(signal, "pthread_sigmask"):  # Windows
+        yield
+        return
+    from multiprocessing import resource_tracker
+
+    resource_tracker.ensure_running()  # where the first process starts it, it unblocks signals
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def run_cases(

@@ -43,10 +43,9 @@ class Journal:
             raise UsageError(f"{self.path}: is of another sweep; without this file it starts anew")
 
     def add(self, rows: list[tuple[int, dict]]) -> None:
-        for number, row in rows:
-            self.rows[number] = row
-            self._file.write(json.dumps([number, row]) + "\n")
+        self._file.write("".join(json.dumps([number, row]) + "\n" for number, row in rows))
         self._file.flush()
+        self.rows |= dict(rows)
 
     def close(self) -> None:
         self._file.close()
