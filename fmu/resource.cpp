@@ -12,7 +12,7 @@ namespace tiefmu {
 namespace {
 
 constexpr std::string_view magic = "tiefmu scene\n";
-constexpr std::uint32_t formatVersion = 5;  // raise it whenever a `field` changes
+constexpr std::uint32_t formatVersion = 6;  // raise it whenever a `field` changes
 constexpr std::size_t headerSize = magic.size() + 4 + 8 + 8;
 
 // FNV-1a, 64 bit: against damage in transport, not against intent.
@@ -183,6 +183,8 @@ void checkSettings(const Settings& s) {
   };
   std::apply([&](const auto&... m) { (check(m), ...); }, settingsMembers);
   require(s.threads >= 0 && s.threads <= mostThreads, "threads");
+  require(s.reactionLead >= 0 && s.reactionLead <= 1, "reaction lead");
+  require(s.reactionLead == 0 || s.reaction != Reaction::loads, "reaction lead");
   require(s.solverTolerance > 0 && s.solverTolerance < 1, "solver tolerance");
 }
 

@@ -12,7 +12,7 @@ namespace tiefmu {
 namespace {
 
 constexpr std::string_view magic = "tiefmu state\n";
-constexpr std::uint32_t formatVersion = 3;  // raise it whenever `fields` or the layout of the array changes
+constexpr std::uint32_t formatVersion = 4;  // raise it whenever `fields` or the layout of the array changes
 constexpr std::size_t headerSize = magic.size() + 4 + 8 + 8;
 
 // Four chains of h = rotl(h ^ word) * odd, which run at memory bandwidth. Each is one to one in every word, so that a

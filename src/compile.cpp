@@ -8,6 +8,8 @@ Model Compilation::run() {
   model.settings = scene.settings;
   if (scene.settings.inertia == Inertia::lumped && scene.settings.reaction == Reaction::split)
     throw SceneError("model: reaction: 'split' needs inertia = 'consistent' (with lumped inertia it equals 'loads')");
+  if (scene.settings.reactionLead > 0 && scene.settings.reaction == Reaction::loads)
+    throw SceneError("model: reaction_lead: 'loads' answers to no accelerations; it is for 'split' and 'full'");
   if (!scene.ports.empty() && scene.settings.position == Position::input)
     throw SceneError("interface: ports: need position = 'integrated' in [model]: a port's nodes move with the port");
   if (scene.settings.safety > 1)
@@ -17,6 +19,8 @@ Model Compilation::run() {
   chooseCouplings();
   resolveRotations();
   placeNodes();
+  if (scene.settings.reactionLead > 0 && !model.anyDriven())
+    throw SceneError("model: reaction_lead: no node is driven, so there is no host that holds a reaction");
   placeSlaves();
   placeSprings();
   placePorts();

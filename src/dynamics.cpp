@@ -40,6 +40,7 @@ Dynamics::Dynamics(const Model& m, const Layout& l, double* d)
     vs_.resize(3 * s);
     ws_.resize(3 * u);
   }
+  ahead_.resize(layout[Field::accelerationChange].count);
   if (consistent || energy || has(Field::slaveAcceleration)) {
     as_.resize(3 * s);
     zs_.resize(3 * u);
@@ -154,6 +155,30 @@ void Dynamics::sumReactions() {
 
 void Dynamics::updateSlaveAccelerations(const double* a, const double* z, const double* v, const double* w) {
   ties.mapAccelerations(a, z, v, w, as_.data(), zs_.data());
+}
+
+Dynamics::Accelerations Dynamics::answered() {
+  const double *a = field(Field::acceleration), *z = field(Field::angularAcceleration);
+  if (!has(Field::accelerationChange)) return {a, z};
+  const double *change = field(Field::accelerationChange), lead = model.settings.reactionLead;
+  const std::size_t nodes = layout[Field::acceleration].count;
+  for (std::size_t k = 0; k < ahead_.size(); ++k) ahead_[k] = (k < nodes ? a[k] : z[k - nodes]) + lead * change[k];
+  return {ahead_.data(), ahead_.data() + nodes};
+}
+
+void Dynamics::holdAccelerations(bool before) {
+  if (!has(Field::accelerationChange)) return;
+  const int first = 3 * model.freeBegin(), last = 3 * model.freeEnd(), end = 3 * model.nodes();
+  double *held = field(Field::heldAcceleration), *change = field(Field::accelerationChange);
+  const auto hold = [&](int begin, int count, const double* now) {
+    for (int k = 0; k < count; ++k) {
+      change[begin + k] = before ? now[k] - held[begin + k] : 0;
+      held[begin + k] = now[k];
+    }
+  };
+  hold(0, first, field(Field::acceleration));
+  hold(last, end - last, field(Field::acceleration) + last);
+  hold(end, first, field(Field::angularAcceleration));
 }
 
 // In place of the slaves' accelerations the loads less what these take.

@@ -54,6 +54,12 @@ class Dynamics {
   void updateSlaveAccelerations(const double* a, const double* z, const double* v, const double* w);
   void turnIntoInertialLoads() { turnIntoInertialLoads(as_.data(), zs_.data()); }
   void turnIntoInertialLoads(double* as, double* zs);  // the same with any such arrays
+  // What the reactions answer to: the nodes' accelerations, ahead of the present ones where the scene says so, theory
+  // (5.11). Until the next call.
+  struct Accelerations { const double *linear, *angular; };
+  Accelerations answered();
+  // At the end of a step: the driven nodes' accelerations in it. `before`: there was one before it.
+  void holdAccelerations(bool before);
   std::vector<double>& slaveAcceleration() { return as_; }
   std::vector<double>& slaveAngularAcceleration() { return zs_; }
   // M^-1 of the free nodes, on node arrays: loads f, t to accelerations a, z.
@@ -122,6 +128,7 @@ class Dynamics {
   std::vector<double> tieForceScratch_, tieMomentScratch_;  // where reactionForce is more than T^T f_s
   std::vector<double> as_, zs_;                             // slaves' accelerations, or the loads of their inertia
   std::vector<double> vs_, ws_;                             // slaves' velocities, for energies
+  std::vector<double> ahead_;                               // answered(): of the nodes, then of the rotating ones
   std::vector<double> right_, rightMoment_;                 // right side of the mass matrix
   std::vector<double> step_, stepSpin_;                     // velocities of a drift
   double turnRate_ = 0;

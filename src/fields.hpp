@@ -44,6 +44,8 @@ enum class Field : std::uint8_t {
   portPlace,
   portRotation,
   work,
+  heldAcceleration,
+  accelerationChange,
   lagged,
   predicted,
   guess,
@@ -120,6 +122,7 @@ enum class When : std::uint8_t {
   framesTurn,          // somebody asks for the rotations of meanMotion segments
   anglesAdd,           // small displacements of ties that follow rotations
   finite,              // finite displacements
+  led,                 // reactions that run ahead
   damped,              // free nodes with dampers
   biased,              // free nodes whose accelerations depend on their velocities
   iterated,            // free nodes whose accelerations an iteration finds
@@ -177,6 +180,10 @@ inline constexpr FieldRow fieldRows[] = {
     {Field::portPlace, "port_place", "m", 3, Per::drivenPort, Role::state},                        // reference points
     {Field::portRotation, "port_rotation", "1", 4, Per::drivenPort, Role::state, When::finite},    // since the start
     {Field::work, "work", "J", Work::entries, Per::simulation, Role::state, When::exposed, "energy"},
+    {Field::heldAcceleration, "held_acceleration", "m/s2, rad/s2", 3, Per::nodeThenRotatingNode, Role::state,
+     When::led},  // of driven nodes, in the last step
+    {Field::accelerationChange, "acceleration_change", "m/s2, rad/s2", 3, Per::nodeThenRotatingNode, Role::state,
+     When::led},  // from that of the step before it
     {Field::lagged, "lagged_velocity", "m/s, rad/s", 3, Per::nodeThenRotatingNode, Role::state,
      When::damped},  // that the last damping forces used
     {Field::predicted, "predicted_velocity", "m/s, rad/s", 3, Per::nodeThenRotatingNode, Role::state,

@@ -46,6 +46,7 @@ bool isPresent(const FieldRow& row, const Model& model) {
              std::any_of(model.groups.begin(), model.groups.end(),
                          [](const TieGroup& group) { return kinematicsOf(group.coupling).mastersTurn; });
     case When::finite: return model.finite();
+    case When::led: return model.settings.reactionLead > 0;
     case When::damped:
       return model.anyFree() && anySpring(model, [](const Spring& spring) {
                return !spring.damping.isZero(0) || !spring.rotationalDamping.isZero(0);

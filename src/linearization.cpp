@@ -152,10 +152,10 @@ void Linearization::chainLoads() {
 }
 
 // Of the slaves' accelerations to as_, zs_: T q'' + b, with the bias of these velocities.
-void Linearization::chainSlaveAccelerations(Field velocities) {
-  then([this, velocities](Way way) {
+void Linearization::chainSlaveAccelerations(Field velocities, bool answered) {
+  then([this, velocities, answered](Way way) {
     if (d_.has(Field::acceleration))
-      map(way, of(Field::acceleration), of(Field::angularAcceleration), d_.field(Field::acceleration), as_.data(),
+      map(way, of(Field::acceleration), of(Field::angularAcceleration), accelerations(answered).linear, as_.data(),
           zs_.data());
     if (!d_.ties.hasBias()) return;
     const double *v = velocityOf(velocities), *w = spinOf(velocities);
@@ -167,26 +167,32 @@ void Linearization::chainSlaveAccelerations(Field velocities) {
 }
 
 // Of the loads of the slaves' inertia, passed on to the nodes.
-void Linearization::chainInertialLoads(Field velocities, std::vector<double>& f, std::vector<double>& t) {
-  then([this, velocities, &f, &t](Way way) {
+void Linearization::chainInertialLoads(Field velocities, bool answered, std::vector<double>& f,
+                                       std::vector<double>& t) {
+  then([this, velocities, answered, &f, &t](Way way) {
     distribute(way, true, as_, zs_, f, t);
     if (!framesMove()) return;
-    d_.updateSlaveAccelerations(d_.field(Field::acceleration), d_.field(Field::angularAcceleration),
-                                velocityOf(velocities), spinOf(velocities));
+    const auto [a, z] = accelerations(answered);
+    d_.updateSlaveAccelerations(a, z, velocityOf(velocities), spinOf(velocities));
     d_.turnIntoInertialLoads();
     distributeByFrames(way, d_.slaveAcceleration().data(), d_.slaveAngularAcceleration().data(), f.data());
+  });
+}
+
+// The next ones are others.
+void Linearization::startSlaveAccelerationsAnew() {
+  then([this](Way) {
+    std::fill(as_.begin(), as_.end(), 0.0);
+    std::fill(zs_.begin(), zs_.end(), 0.0);
   });
 }
 
 // Of the free nodes' accelerations, from the equation of motion. Those of driven nodes are given.
 void Linearization::chainAccelerations() {
   if (d_.model.settings.inertia == Inertia::consistent) {
-    chainSlaveAccelerations(Field::predicted);
-    chainInertialLoads(Field::predicted, right_, rightMoment_);
-    then([this](Way) {  // the next accelerations are others
-      std::fill(as_.begin(), as_.end(), 0.0);
-      std::fill(zs_.begin(), zs_.end(), 0.0);
-    });
+    chainSlaveAccelerations(Field::predicted, false);
+    chainInertialLoads(Field::predicted, false, right_, rightMoment_);
+    startSlaveAccelerationsAnew();
   }
   then([this](Way way) {
     for (auto* load : {&f_, &nodeLoad_}) add(way, *load, right_);
@@ -210,8 +216,13 @@ void Linearization::chainReactions() {
   const bool consistent = model.settings.inertia == Inertia::consistent;
   const bool loads = model.settings.reaction == Reaction::loads, split = model.settings.reaction == Reaction::split;
   const bool inertial = consistent && !loads;
-  if (inertial || d_.has(Field::slaveAcceleration)) chainSlaveAccelerations(Field::velocity);
-  if (inertial) chainInertialLoads(Field::velocity, f_, t_);
+  if (inertial) {
+    chainSlaveAccelerations(Field::velocity, true);
+    chainInertialLoads(Field::velocity, true, f_, t_);
+    if (d_.has(Field::accelerationChange)) startSlaveAccelerationsAnew();
+  }
+  if (d_.has(Field::slaveAcceleration) && (!inertial || d_.has(Field::accelerationChange)))
+    chainSlaveAccelerations(Field::velocity, false);
   if (loads || (consistent && !split)) return;
   then([this, sign = split ? 1.0 : -1.0](Way way) {
     const auto inertia = [&](int nodes, const double* added, double* a, double* load) {

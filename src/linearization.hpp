@@ -27,8 +27,9 @@ class Linearization {
   using Link = std::function<void(Way)>;
   void then(Link link) { chain_.push_back(std::move(link)); }
   void chainLoads();
-  void chainSlaveAccelerations(Field velocities);
-  void chainInertialLoads(Field velocities, std::vector<double>& f, std::vector<double>& t);
+  void chainSlaveAccelerations(Field velocities, bool answered);
+  void chainInertialLoads(Field velocities, bool answered, std::vector<double>& f, std::vector<double>& t);
+  void startSlaveAccelerationsAnew();
   void chainAccelerations();
   void chainReactions();
   void chainOutputs();
@@ -46,6 +47,11 @@ class Linearization {
   // Of the nodes, for the bias: Field::velocity or Field::predicted.
   const double* velocityOf(Field f) const { return d_.velocityFor(f); }
   const double* spinOf(Field f) const { return f == Field::velocity ? d_.field(Field::spin) : d_.spinFor(f); }
+  // Of the nodes: those that the reactions answer to, or the present ones.
+  Dynamics::Accelerations accelerations(bool answered) const {
+    if (answered) return d_.answered();
+    return {d_.field(Field::acceleration), d_.field(Field::angularAcceleration)};
+  }
   // Are the nodes' positions inputs, and do the frames of segments follow them?
   bool placesMove() const { return d_.has(Field::position) && !d_.positionsIntegrated(); }
   bool framesMove() const { return placesMove() && d_.model.finite(); }

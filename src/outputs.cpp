@@ -19,17 +19,19 @@ void Outputs::update() {
 void Outputs::updateReactions() {
   const Model& model = d_.model;
   const double *v = field(Field::velocity), *w = field(Field::spin);
-  const double *a = field(Field::acceleration), *z = field(Field::angularAcceleration);
   const bool consistent = model.settings.inertia == Inertia::consistent;
   const bool loads = model.settings.reaction == Reaction::loads, split = model.settings.reaction == Reaction::split;
-  if ((consistent && !loads) || d_.has(Field::slaveAcceleration)) d_.updateSlaveAccelerations(a, z, v, w);
-  if (d_.has(Field::slaveAcceleration))
+  if (d_.has(Field::slaveAcceleration)) {
+    d_.updateSlaveAccelerations(field(Field::acceleration), field(Field::angularAcceleration), v, w);
     std::copy(d_.slaveAcceleration().begin(), d_.slaveAcceleration().end(), field(Field::slaveAcceleration));
+  }
   if (loads) return;  // T^T f_s, which an evaluation writes to the field
+  const auto [a, z] = d_.answered();
   double *f = field(Field::reactionForce), *t = field(Field::reactionMoment);
   std::copy_n(d_.tieForce(), d_.layout[Field::reactionForce].count, f);
   std::copy_n(d_.tieMoment(), d_.layout[Field::reactionMoment].count, t);
   if (consistent) {
+    if (!d_.has(Field::slaveAcceleration) || d_.has(Field::accelerationChange)) d_.updateSlaveAccelerations(a, z, v, w);
     d_.turnIntoInertialLoads();
     d_.ties.distributeLoads(d_.slaveAcceleration().data(), d_.slaveAngularAcceleration().data(), f, t);
   }

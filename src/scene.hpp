@@ -93,6 +93,7 @@ struct ScenePort {
 struct Settings {
   Inertia inertia{};
   Reaction reaction{};
+  double reactionLead = 0;  // from 0 to 1, theory (5.11)
   Geometry geometry{};
   Position position{};
   Vec3 gravity = Vec3::Zero();  // m/s2
@@ -112,6 +113,7 @@ template <class T> struct SettingsMember {
 };
 inline constexpr std::tuple settingsMembers{SettingsMember{"inertia", &Settings::inertia},
                                             SettingsMember{"reaction", &Settings::reaction},
+                                            SettingsMember{"reaction_lead", &Settings::reactionLead},
                                             SettingsMember{"geometry", &Settings::geometry},
                                             SettingsMember{"position", &Settings::position},
                                             SettingsMember{"solver_tolerance", &Settings::solverTolerance},

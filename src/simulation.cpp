@@ -20,7 +20,7 @@ constexpr int checkEvery = 16;  // substeps between two looks for divergence
 constexpr double maxSubsteps = 1e9;
 constexpr double none = 1e30;
 
-enum Flag : std::uint32_t { accelerationsValid = 1, energyStarted = 2, initialised = 4 };
+enum Flag : std::uint32_t { accelerationsValid = 1, energyStarted = 2, initialised = 4, stepped = 8 };
 
 }  // namespace
 
@@ -185,6 +185,34 @@ struct Simulation::Impl {
     checks.checkSegments(time);
     if (energy) field(Field::work)[Work::totalAtLastStep] = totalEnergy();
   }
+
+  // Simulation::step but for what it leaves for the answers after it.
+  void advance(double duration) {
+    const double before = time;
+    const std::int64_t substepsBefore = substeps;
+    const auto restore = [&] {
+      undo();
+      time = before;
+      substeps = substepsBefore;
+    };
+    backup.save();
+    try {
+      checks.checkPorts(time, duration);
+      if (model->anyFree())
+        integrate(duration);
+      else
+        carry(duration);
+      dynamics.inputs.clear();
+      outputsDirty = true;
+      if (!model->anyFree()) loadsDirty = true;
+    } catch (const SceneError& e) {  // the mass matrix of a geometry that has blown up
+      restore();
+      throw Diverged("diverged after t = " + std::to_string(before) + " s: " + e.what());
+    } catch (...) {
+      restore();
+      throw;
+    }
+  }
 };
 
 Simulation::Simulation(std::shared_ptr<const Model> model) : impl_(std::make_unique<Impl>(std::move(model))) {
@@ -256,12 +284,12 @@ void Simulation::outputRates(double* rates) {
     s.flags &= ~accelerationsValid;
     s.loadsDirty = true;
     std::vector<InputDerivatives> inputs = s.dynamics.inputs.all();
-    step(h);
+    s.advance(h);
     updateOutputs();
     std::copy(s.data.begin(), s.data.end(), rates);
     for (InputDerivatives& d : inputs) d.first += h * d.second;
     s.dynamics.inputs.assign(inputs, s.layout);
-    step(h);
+    s.advance(h);
     updateOutputs();
   } catch (...) {
     undo();
@@ -303,30 +331,9 @@ void Simulation::initialise(double time) {
 void Simulation::step(double duration) {
   assert(duration > 0 && std::isfinite(duration));
   Impl& s = *impl_;
-  const double time = s.time;
-  const std::int64_t substeps = s.substeps;
-  const auto undo = [&] {
-    s.undo();
-    s.time = time;
-    s.substeps = substeps;
-  };
-  s.backup.save();
-  try {
-    s.checks.checkPorts(s.time, duration);
-    if (s.model->anyFree())
-      s.integrate(duration);
-    else
-      s.carry(duration);
-    s.dynamics.inputs.clear();
-    s.outputsDirty = true;
-    if (!s.model->anyFree()) s.loadsDirty = true;
-  } catch (const SceneError& e) {  // the mass matrix of a geometry that has blown up
-    undo();
-    throw Diverged("diverged after t = " + std::to_string(time) + " s: " + e.what());
-  } catch (...) {
-    undo();
-    throw;
-  }
+  s.advance(duration);
+  s.dynamics.holdAccelerations((s.flags & stepped) != 0);
+  s.flags |= stepped;
 }
 
 double Simulation::largestSubstep() const {

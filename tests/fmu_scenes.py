@@ -6,7 +6,7 @@ import tiefmu
 from fmu_calls import Fmu
 
 SETTINGS = [
-    # formulation, rotations, motion of the masters, inertia, reaction, geometry, position
+    # formulation, rotations, motion of the masters, inertia, reaction, geometry, position; reaction_lead
     ("default", True, "driven", "lumped", "loads", "finite", "integrated"),
     ("default", True, "driven", "lumped", "full", "finite", "integrated"),
     ("default", True, "driven", "consistent", "full", "finite", "integrated"),
@@ -24,6 +24,7 @@ SETTINGS = [
     ("optimized", False, "mixed", "lumped", "full", "small", "integrated"),
     ("optimized", False, "mixed", "consistent", "split", "finite", "integrated"),
     ("optimized", True, "free", "lumped", "loads", "finite", "integrated"),
+    ("optimized", True, "driven", "consistent", "split", "finite", "input", 0.75),
 ]
 
 
@@ -35,7 +36,7 @@ def extras() -> list[str]:
     return str(refused.value).split("; known: ")[1].split(", ")
 
 
-def scene(rng, formulation, rotations, motion, inertia, reaction, geometry, position) -> dict:
+def scene(rng, formulation, rotations, motion, inertia, reaction, geometry, position, reaction_lead=0.0) -> dict:
     """Two pairs of a quad and a triangle, apart from each other, with slaves off their surfaces, two of which hold
     dampers to a driven and to a free point."""
     turn, _ = np.linalg.qr(rng.normal(size=(3, 3)))
@@ -97,6 +98,7 @@ def scene(rng, formulation, rotations, motion, inertia, reaction, geometry, posi
         "model": {
             "inertia": inertia,
             "reaction": reaction,
+            "reaction_lead": reaction_lead,
             "geometry": geometry,
             "position": position,
             "gravity": [0.3, 0.0, -9.81],
@@ -121,6 +123,7 @@ def random_values(fmu, rng, knowns) -> dict[str, float]:
 
 MIXED = ("default", True, "mixed", "consistent", "split", "finite", "integrated")
 DRIVEN = ("default", False, "driven", "lumped", "full", "small", "input")
+LED = SETTINGS[-1]
 ALL_FREE = ("optimized", True, "free", "lumped", "loads", "finite", "integrated")
 
 
@@ -130,7 +133,7 @@ def fmu(tmp_path_factory):
     return Fmu(scene(np.random.default_rng(1), *MIXED), tmp_path_factory.mktemp("fmu"))
 
 
-@pytest.fixture(scope="module", params=[MIXED, ALL_FREE, DRIVEN], ids=["mixed", "free", "driven"])
+@pytest.fixture(scope="module", params=[MIXED, ALL_FREE, DRIVEN, LED], ids=["mixed", "free", "driven", "led"])
 def any_fmu(request, tmp_path_factory):
     return Fmu(scene(np.random.default_rng(2), *request.param), tmp_path_factory.mktemp("fmu"))
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from differences import check_derivatives, directional
 from fmu_calls import ERROR, OK, Fmu, Instance, set_derivatives
-from fmu_scenes import ALL_FREE, DRIVEN, MIXED, random_values, scene
+from fmu_scenes import ALL_FREE, DRIVEN, LED, MIXED, random_values, scene
 
 KINDS = [("default", True), ("default", False), ("optimized", True), ("optimized", False)]
 INERTIAS = [
@@ -32,6 +32,8 @@ def settings():
             yield (*kind, motion, *inertia, *geometry)
     for kind, inertia, geometry in itertools.product(KINDS[:3], ["lumped", "consistent"], ["finite", "small"]):
         yield (*kind, "free", inertia, "loads", geometry, "integrated")
+    yield LED
+    yield (*MIXED, 1.0)
 
 
 @pytest.mark.parametrize("case", list(settings()), ids=lambda case: "-".join(map(str, case)))

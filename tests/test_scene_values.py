@@ -40,6 +40,10 @@ TOLERANCE = [
     (value, line.replace("+31 is too large; it must be at most 1e+30", "+31 is too large; it must be at most 0.01"))
     for value, line in FINITE
 ] + [(0, "0 is too small; it must be at least 1e-13"), (0.1, "0.1 is too large; it must be at most 0.01")]
+SHARE = [
+    (value, line.replace("+31 is too large; it must be at most 1e+30", "+31 is too large; it must be at most 1"))
+    for value, line in FINITE
+] + [(-0.1, "-0.1 is too small; it must be at least 0"), (1.5, "1.5 is too large; it must be at most 1")]
 THREADS = [
     (0, "0 is too small; it must be at least 1"),
     (-3, "-3 is too small; it must be at least 1"),
@@ -175,6 +179,7 @@ KEYS = {
     ("model", "inertia"): one_of("lumped", "consistent"),
     ("model", "solver_tolerance"): TOLERANCE,
     ("model", "reaction"): one_of("loads", "full", "split"),
+    ("model", "reaction_lead"): SHARE,
     ("model", "geometry"): one_of("finite", "small"),
     ("model", "position"): one_of("integrated", "input"),
     ("model", "gravity"): VECTOR,

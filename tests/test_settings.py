@@ -56,6 +56,7 @@ def test_every_key_arrives():
         "inertia": "consistent",
         "solver_tolerance": 1e-9,
         "reaction": "split",
+        "reaction_lead": 0.5,
         "geometry": "small",
         "position": "input",
         "gravity": [1.0, 2.0, -3.0],
@@ -65,6 +66,7 @@ def test_every_key_arrives():
     settings = Assembly(schema.parse(scene), Path(".")).settings()
     assert settings.inertia == _core.Inertia.consistent
     assert settings.reaction == _core.Reaction.split
+    assert settings.reaction_lead == 0.5
     assert settings.geometry == _core.Geometry.small
     assert settings.position == _core.Position.input
     assert settings.method == _core.Method.noh_bathe

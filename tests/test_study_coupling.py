@@ -121,7 +121,7 @@ def test_exact_host(mass, stiffness):
     step, u, v, loads = 0.3, 0.4, -1.3, (5.0, 3.0, -2.0)  # loads now, one and two steps ago
 
     class Still:
-        pass
+        leads = False
 
     state = np.array([[u], [v], [0.0], [loads[1]], [loads[2]]])
     after, end = Coupling(Still(), host, step, 2).advance(state, np.array([loads[0]]))

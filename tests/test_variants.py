@@ -49,6 +49,7 @@ SCENE = {
         "inertia": "lumped",
         "solver_tolerance": 1e-5,
         "reaction": "full",
+        "reaction_lead": 0.5,
         "geometry": "finite",
         "position": "integrated",
         "gravity": [0.0, 0.0, -9.81e-3],
@@ -63,7 +64,7 @@ CHANGED = {  # what a variant is about, and what the studies set themselves
     "tie": {"segments", "slaves"},
     "spring": {"nodes", "ground"},
     "initial": {"nodes"},
-    "model": {"inertia", "solver_tolerance", "geometry", "reaction", "position"},
+    "model": {"inertia", "solver_tolerance", "geometry", "reaction", "reaction_lead", "position"},
     "integrator": {"method", "time_step", "safety"},
     "interface": {"expose", "hide"},
 }

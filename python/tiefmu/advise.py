@@ -355,10 +355,13 @@ def written(source, advice: Advice, options) -> str:
     raw = tables.model_dump(exclude_unset=True, exclude_none=True)
     raw.setdefault("model", {}).update(inertia=c.variant.inertia, geometry=c.variant.geometry)
     if source.any_driven:
+        raw["model"].pop("reaction_lead", None)
         raw["model"]["reaction"] = c.reaction
-        chosen = advice.host and advice.host.chosen and BY_NAME[advice.host.chosen.mode].reaction
-        if chosen:
-            raw["model"].update(reaction=chosen, inertia="lumped" if chosen == "loads" else "consistent")
+        mode = BY_NAME[advice.host.chosen.mode] if advice.host and advice.host.chosen else None
+        if mode and mode.reaction:
+            raw["model"].update(reaction=mode.reaction, inertia="lumped" if mode.reaction == "loads" else "consistent")
+            if mode.reaction_lead:
+                raw["model"]["reaction_lead"] = mode.reaction_lead
     if not c.driven:
         per = source.units.si("time_step", 1.0)
         raw.setdefault("integrator", {}).update(method=c.method, time_step=float(c.step / per), safety=SAFETY)

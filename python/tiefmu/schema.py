@@ -266,6 +266,7 @@ class Model(Table):
     inertia: Literal["lumped", "consistent"] = "lumped"
     solver_tolerance: Annotated[float, Field(ge=1e-13, le=1e-2)] = 1e-4
     reaction: Literal["loads", "full", "split"] = "loads"
+    reaction_lead: Annotated[float, Field(ge=0, le=1)] = 0.0
     geometry: Literal["finite", "small"] = "finite"
     position: Literal["integrated", "input"] = "integrated"
     gravity: Vector = [0.0, 0.0, 0.0]

@@ -79,6 +79,11 @@ def settings(scene: Scene, found: dict) -> list[str]:
         REACTIONS[chosen.reaction],
         f"Inertia: {chosen.inertia}; geometry: {chosen.geometry}; positions of driven nodes: {chosen.position}.",
     ]
+    if chosen.reaction_lead:
+        lines.append(
+            "Reactions run ahead: they answer to the accelerations plus "
+            f"{chosen.reaction_lead:g} times their change over the last step, for a host that holds them."
+        )
     if any(row["motion"] == "free" for row in found["masters"] + found["points"]):
         lines.append(
             f"Stable step: {step(found['stable_time_step'])}, nodal step: {step(found['nodal_time_step'])}. "

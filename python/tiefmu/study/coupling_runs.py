@@ -56,7 +56,7 @@ class Study:
             )
         self.base = self.source.arrays(self.source.tables, heavy=False)
         self.base.initial = []
-        change(self.base.model, gravity=[0.0, 0.0, 0.0], position="input")
+        change(self.base.model, gravity=[0.0, 0.0, 0.0], position="input", reaction_lead=0.0)
         change(self.base.interface, expose=[], hide=[])
         tie = InProcess(self.scene("loads"))
         found = self.source.scene.model.report()

@@ -65,6 +65,7 @@ class Tie:
         master = nodes["master"].astype(bool)
         row = {int(number): i for i, number in enumerate(nodes["number"]) if master[i]}
         driven, turning = [row[i] for i in self.names.driven], [row[i] for i in self.names.turning]
+        self.rows = driven + [len(nodes["id"]) + i for i in turning]  # of held_acceleration
         self.start = nodes["position"][driven].ravel()
         self.own = np.repeat(np.concatenate([nodes["mass"][driven], nodes["inertia"][turning]]), 3)
         self.node_ids = nodes["id"][driven]
@@ -78,10 +79,15 @@ class Tie:
         found = scene.model.report()
         turning = (found["slaves"]["coupling"] != found["couplings"].index("translation")).any()
         free = (found["nodes"]["motion"] == MOTIONS.index("free")).any()
-        self.keeps_state = bool(found["springs"] and (turning or free))
+        self.leads = "acceleration_change" in scene.start.fields
+        self.keeps_state = self.leads or bool(found["springs"] and (turning or free))
 
     def restart(self) -> None:
         """Back to time 0."""
+        raise NotImplementedError
+
+    def remember(self, held: np.ndarray, change: np.ndarray) -> None:
+        """As after two steps: accelerations of the last one, and what they are more than in the one before."""
         raise NotImplementedError
 
     def set_inputs(self) -> None:
@@ -134,6 +140,12 @@ class InProcess(Tie):
         """Back to time 0."""
         self.simulation.reset()
         self.simulation.initialise(0.0)
+
+    def remember(self, held, change):
+        for field, values in (("held_acceleration", held), ("acceleration_change", change)):
+            rows = self.simulation.get(field).reshape(-1, 3)
+            rows[self.rows] = values.reshape(-1, 3)
+            self.simulation.set(field, rows)
 
     def set_inputs(self):
         self.simulation.set_values(self.names.inputs, self.inputs)
@@ -289,6 +301,9 @@ class Exchange:
         """The FMU back to time 0."""
         raise NotImplementedError
 
+    def prepare(self, state: np.ndarray) -> None:
+        """Brings the FMU to a state that it has not come to by itself."""
+
     def carry(self, state: np.ndarray, following: np.ndarray, time: float) -> None:
         """Brings along what the FMU keeps beside the state. Raises Diverged."""
 
@@ -303,6 +318,7 @@ class Exchange:
         for k in range(self.rest().size):
             state = self.rest()
             state.flat[k] = 1.0
+            self.prepare(state)
             columns.append(self.following(state).ravel())
         return np.array(columns).T
 
@@ -326,6 +342,7 @@ class Exchange:
         rng = np.random.default_rng(seed)
         self.restart()
         state = rng.normal(size=(self.rows, self.freedoms)) / self.units()[:, None]
+        self.prepare(state)
         peaks, first = np.zeros(4), 0.0
         for k in range(steps):
             try:
@@ -349,10 +366,11 @@ class Coupling(Exchange):
     """The tie answers the host's motion, the host moves on with that answer.
 
     order: 0 load held, 1 linear, 2 quadratic extrapolation. lead: what is held is the load and so much of its last
-    change. closed: with reaction `full`, the load is that of the accelerations which it causes: one step of Newton's
-    method with the tie's derivatives of its loads, theory (5.7). differenced: the acceleration that the tie gets is the
-    second order backward difference (BDF2) of the velocities in place of the host's own. host: with the inertia that
-    the tie's `reaction` asks the host to carry.
+    change, by the host; the tie's own lead, theory (5.11), shows as two more rows of the state. closed: with reaction
+    `full`, the load is that of the accelerations which it causes: one step of Newton's method with the tie's
+    derivatives of its loads, theory (5.7). differenced: the acceleration that the tie gets is the second order backward
+    difference (BDF2) of the velocities in place of the host's own. host: with the inertia that the tie's `reaction`
+    asks the host to carry.
     """
 
     watched = 2  # accelerations
@@ -370,11 +388,15 @@ class Coupling(Exchange):
         super().__init__(step, len(host.mass))
         self.tie, self.host, self.order, self.differenced, self.lead = tie, host, order, differenced, lead
         self.shift = host.propagator(step)
-        self.rows = 5 if differenced else 4 if lead else 3 + order
+        self.rows = 5 if differenced or tie.leads else 4 if lead else 3 + order
         self.closing = self.newton() if closed else None
 
     def restart(self):
         self.tie.restart()
+
+    def prepare(self, state):
+        if self.tie.leads:
+            self.tie.remember(*state[3:])
 
     @functools.cached_property
     def still(self) -> np.ndarray:
@@ -428,6 +450,8 @@ class Coupling(Exchange):
         following[2] = (end - self.host.stiffness * following[0] - self.host.damping * following[1]) / self.host.mass
         if self.differenced:
             following[3], following[4] = v, state[3]
+        elif self.tie.leads:
+            following[3], following[4] = state[2], state[2] - state[3]
         elif self.rows > 3:
             following[3] = load
             if self.order == 2:
@@ -435,9 +459,9 @@ class Coupling(Exchange):
         return following, end
 
     def units(self) -> np.ndarray:
-        """1, H, H^2, then H^2 / mass or H."""
-        remembered = self.rows - 3
-        memory = [self.size] * 2 if self.differenced else [self.size**2 / np.mean(self.host.mass)] * remembered
+        """1, H, H^2, then of what is remembered: velocities, accelerations or loads."""
+        one = self.size if self.differenced else self.size**2
+        memory = [one if self.differenced or self.tie.leads else one / np.mean(self.host.mass)] * (self.rows - 3)
         return np.array([1, self.size, self.size**2, *memory])
 
 
@@ -460,10 +484,11 @@ class FreeMasters(Exchange):
         self.simulation.reset()
         self.simulation.initialise(0.0)
 
+    def prepare(self, state):
+        self.simulation.set("velocity", state[1])
+
     def following(self, state):
         displacement, velocity = state
-        if not np.array_equal(self.simulation.get("velocity").ravel(), velocity):
-            self.simulation.set("velocity", velocity)  # of a column of the matrix, and at the start of a run
         self.simulation.set("node_force", -self.stiffness * displacement - self.damping * velocity)
         self.simulation.step(self.size)
         after = self.simulation.get("velocity").ravel()

@@ -63,7 +63,15 @@ def edge(fails: Callable[[float], bool], closed: float, reach: float = 1.2, prec
 SQUARE = [[1, 0.0, 0.0, 0.0], [2, 1.0, 0.0, 0.0], [3, 1.0, 1.0, 0.0], [4, 0.0, 1.0, 0.0]]
 
 
-def plate(slave_mass: float, reaction: str, spring=(0.0, 0.0), place=(0.5, 0.5, 0.0), motion="driven", **tie) -> Scene:
+def plate(
+    slave_mass: float,
+    reaction: str,
+    spring=(0.0, 0.0),
+    place=(0.5, 0.5, 0.0),
+    motion="driven",
+    reaction_lead=0.0,
+    **tie,
+) -> Scene:
     """Four masters of 1 kg on a square of 1 m with a slave on it; spring: stiffness (N/m) and damping (N s/m) of the
     slave to ground. Driven masters leave the tie without a state of its own; free ones have exact inertia."""
     scene = {
@@ -72,6 +80,7 @@ def plate(slave_mass: float, reaction: str, spring=(0.0, 0.0), place=(0.5, 0.5, 
         "tie": [{"name": "tie", "segments": "all", "slaves": [5], "search_distance": 10.0, **tie}],
         "model": {
             "reaction": reaction,
+            "reaction_lead": reaction_lead,
             "inertia": "lumped" if reaction == "loads" and motion == "driven" else "consistent",
             "geometry": "small",
             "position": "input" if motion == "driven" else "integrated",

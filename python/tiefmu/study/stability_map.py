@@ -19,8 +19,8 @@ EVERY = 4  # how many grid lines lie between the points that are also decided by
 
 @dataclass(frozen=True)
 class Mode:
-    """A way to couple. reaction: None where the FMU owns the masters; order: of the host's extrapolation; lead, closed:
-    see `Coupling`; asks: what of the host, for advice."""
+    """A way to couple. reaction, reaction_lead: of the scene, None where the FMU owns the masters; order: of the host's
+    extrapolation; lead, closed: see `Coupling`; asks: what of the host, for advice."""
 
     name: str
     title: str
@@ -29,12 +29,13 @@ class Mode:
     order: int = 0
     lead: float = 0.0
     closed: bool = False
+    reaction_lead: float = 0.0
 
     def exchange(self, ratio: float, step: float) -> Exchange:
         """A slave in the middle of four masters, each on a ground spring with omega = 1 rad/s."""
         if self.reaction is None:
             return owned(ratio, step, omega=1.0, zeta=ZETA)
-        scene = driven(ratio, self.reaction)
+        scene = driven(ratio, self.reaction, self.reaction_lead)
         return coupled(
             scene, self.reaction, step, self.order, omega=1.0, zeta=ZETA, lead=self.lead, closed=self.closed
         )  # fmt: skip
@@ -45,6 +46,8 @@ MODES = [
     Mode("loads", "loads (lumped)", "carry M + D", "loads"),
     Mode("full", "full, force held", "hold the last load", "full"),
     Mode("split", "split, force held", "carry M + D, hold the last load", "split"),
+    Mode("split-lead-inside", "split, lead inside the FMU, force held",
+         "carry M + D, hold the last load (reaction_lead = 1 in the scene)", "split", reaction_lead=1.0),
     Mode("split-lead", "split, load and its last change held", "carry M + D, hold the last load plus its last change",
          "split", lead=1.0),
     Mode("split-linear", "split, force extrapolated linearly", "carry M + D, extrapolate the last two loads linearly",
@@ -61,8 +64,8 @@ BY_NAME = {mode.name: mode for mode in MODES}
 
 
 @functools.lru_cache(maxsize=8)
-def driven(ratio: float, reaction: str) -> Scene:
-    return plate(4 * ratio, reaction)
+def driven(ratio: float, reaction: str, reaction_lead: float) -> Scene:
+    return plate(4 * ratio, reaction, reaction_lead=reaction_lead)
 
 
 @dataclass
@@ -182,7 +185,8 @@ def draw(found: list[Point], folder: Path) -> Path:
 
     colours = ["#1a6b54", "#5fb08c", "#c9dfae", "#f2d98b", "#b3402e"]
     labels = ["error < 0.1 %", "< 1 %", "< 10 %", "stable, error > 10 %", "unstable"]
-    figure, panels = figures.pyplot().subplots(2, 4, figsize=(17, 8.2), sharex=True, sharey=True, layout="constrained")
+    size = {"figsize": (13.5, 12.3), "layout": "constrained"}
+    figure, panels = figures.pyplot().subplots(3, 3, sharex=True, sharey=True, **size)
     for axis, mode in zip(panels.flat, MODES):
         own = [p for p in found if p.mode == mode.name]
         ratios, steps = sorted({p.ratio for p in own}), sorted({p.step for p in own})
@@ -227,7 +231,7 @@ def draw(found: list[Point], folder: Path) -> Path:
     marks.append(Line2D([], [], color="black", linestyle="--", label="closed form"))
     figure.legend(
         handles=[Patch(color=c, label=t) for c, t in zip(colours, labels)] + marks,
-        ncol=8,
+        ncol=4,
         loc="outside lower center",
         frameon=False,
     )

@@ -134,7 +134,7 @@ class Source:
         tables = self.penalty(variant) if variant.penalty else self.changed(variant)
         if heavy and self.any_driven:
             tables = self.arrays(tables, heavy=True)
-        change(tables.model, reaction=reaction, position="integrated")
+        change(tables.model, reaction=reaction, reaction_lead=0.0, position="integrated")
         if method == "rk4":  # references, and errors below what the default leaves
             change(tables.model, solver_tolerance=EXACT_TOLERANCE)
         default = schema.Integrator()
