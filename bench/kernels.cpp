@@ -5,7 +5,7 @@
 //                                  slave motion. CASE: default, default-rotations or optimized, then in this order
 //                                  -welds1, -welds4 (quads apart from each other with so many slaves; else a surface
 //                                  of quads with four each), -light (slaves a quarter as heavy), -flipped (the loads
-//                                  on the masters change sign before every step), -consistent
+//                                  on the masters change sign before every step), -long (a hundred substeps a step), -consistent
 //   tiefmu_bench cycles CASE N COUNT   that many cycles and no timing, for instruction counts
 //   tiefmu_bench memory CASE N     bytes per slave of an FMU's simulation, its model included
 //   tiefmu_bench search N [shuffled]   both searches of N slaves on N/4 segments
@@ -47,6 +47,7 @@ double triad() {
 struct Case {
   std::string name, coupling;
   bool consistent, flipped, light;
+  int substeps = 1;  // of a step
   int welds = 0;  // slaves of each quad that stands apart; 0: a surface
   bool take(const char* ending) {
     if (!coupling.ends_with(ending)) return false;
@@ -55,6 +56,7 @@ struct Case {
   }
   explicit Case(const std::string& text) : name(text), coupling(text) {
     consistent = take("-consistent");
+    if (take("-long")) substeps = 100;
     flipped = take("-flipped");
     light = take("-light");
     welds = take("-welds1") ? 1 : take("-welds4") ? 4 : 0;
@@ -156,6 +158,7 @@ class Cycle {
     for (std::size_t k = 0; k < nodeForces; ++k)
       simulation_.field(Field::nodeForce)[k] = 1e-4 * static_cast<double>(k % 5);
     if (what.flipped) flipped_ = nodeForces;
+    duration_ = 1e-6 * what.substeps;
     simulation_.initialise(0);
   }
   int slaves() const { return simulation_.model().slaves(); }
@@ -165,13 +168,14 @@ class Cycle {
       for (std::size_t k = 0; k < flipped_; ++k) force[k] = -force[k];
       simulation_.inputsChanged();
     }
-    simulation_.step(1e-6);
+    simulation_.step(duration_);
     simulation_.updateOutputs();
   }
 
  private:
   Simulation simulation_;
   std::size_t flipped_ = 0;
+  double duration_;
 };
 
 void kernels(const Case& what, int slaves, bool shuffled, int threads) {
@@ -179,7 +183,7 @@ void kernels(const Case& what, int slaves, bool shuffled, int threads) {
   Cycle cycle(what, slaves, shuffled, threads);
   const double seconds = best(cycle);
   row((what.name + (shuffled ? "-shuffled" : "")).c_str(), static_cast<std::size_t>(cycle.slaves()), threads,
-      1e9 * seconds / cycle.slaves(), "ns per slave and cycle", bytesMoved(what), gbs);
+      1e9 * seconds / (cycle.slaves() * what.substeps), "ns per slave and cycle", bytesMoved(what), gbs);
 }
 
 void memory(const Case& what, int slaves) {

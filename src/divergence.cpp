@@ -30,27 +30,35 @@ bool DivergenceChecks::allWithin(std::size_t count, const double* value, double 
 
 void DivergenceChecks::checkVelocities(double time, double limit) {
   const Model& model = d_.model;
-  if (!model.anyFree()) return;
-  for (Field f : {Field::velocity, Field::spin}) {
-    const double* v = d_.field(f);
-    const int last = f == Field::velocity ? model.freeEnd() : model.rotating();
-    if (allWithin(3 * (last - model.freeBegin()), v + 3 * model.freeBegin(), runaway)) continue;
-    for (int i = model.freeBegin(); i < last; ++i)
-      for (int k = 0; k < 3; ++k) {
-        if (std::abs(v[3 * i + k]) < runaway) continue;  // false for NaN
-        char text[200];
-        std::snprintf(text, sizeof text, "%s of node %lld is %.3g %s; limit of the time step %.3g s",
-                      f == Field::velocity ? "velocity" : "angular velocity", static_cast<long long>(model.nodeId[i]),
-                      v[3 * i + k], f == Field::velocity ? "m/s" : "rad/s", limit);
-        throw Diverged(start(time) + text, d_.layout[f].offset + static_cast<std::size_t>(3 * i + k));
-      }
-  }
+  const int first = model.freeBegin(), last = model.freeEnd(), turning = model.rotating();
+  if (last > first && !allWithin(3 * (last - first), d_.field(Field::velocity) + 3 * first, runaway))
+    findVelocity(Field::velocity, last, time, limit);
+  if (turning > first && !allWithin(3 * (turning - first), d_.field(Field::spin) + 3 * first, runaway))
+    findVelocity(Field::spin, turning, time, limit);
+}
+
+void DivergenceChecks::findVelocity(Field f, int last, double time, double limit) const {
+  const Model& model = d_.model;
+  const double* v = d_.field(f);
+  for (int i = model.freeBegin(); i < last; ++i)
+    for (int k = 0; k < 3; ++k) {
+      if (std::abs(v[3 * i + k]) < runaway) continue;  // false for NaN
+      char text[200];
+      std::snprintf(text, sizeof text, "%s of node %lld is %.3g %s; limit of the time step %.3g s",
+                    f == Field::velocity ? "velocity" : "angular velocity", static_cast<long long>(model.nodeId[i]),
+                    v[3 * i + k], f == Field::velocity ? "m/s" : "rad/s", limit);
+      throw Diverged(start(time) + text, d_.layout[f].offset + static_cast<std::size_t>(3 * i + k));
+    }
 }
 
 void DivergenceChecks::checkPositions(double time, double h) {
   const double *x = d_.field(Field::position), *v = d_.field(Field::velocity);
   const std::size_t count = d_.layout[Field::position].count;
   if (allWithin(count, x, farAway / 2) && (h == 0 || allWithin(count, v, farAway / (2 * h)))) return;
+  findPosition(x, v, count, time, h);
+}
+
+void DivergenceChecks::findPosition(const double* x, const double* v, std::size_t count, double time, double h) const {
   for (std::size_t k = 0; k < count; ++k) {
     if (std::abs(x[k] + h * v[k]) < farAway) continue;  // false for NaN
     char text[120];
@@ -60,8 +68,7 @@ void DivergenceChecks::checkPositions(double time, double h) {
   }
 }
 
-void DivergenceChecks::checkPorts(double time, double h) {
-  if (d_.model.ports.empty()) return;
+void DivergenceChecks::checkEachPort(double time, double h) {
   for (const auto& [place, rate] :
        {std::pair{Field::portPlace, Field::portVelocity}, std::pair{Field::portRotation, Field::portSpin}})
     for (std::size_t k = 0; k < d_.layout[rate].count; ++k) {
@@ -74,8 +81,7 @@ void DivergenceChecks::checkPorts(double time, double h) {
   if (!flat.empty()) throw Diverged(start(time) + "the slaves of port '" + flat + "' have come to lie on a line");
 }
 
-void DivergenceChecks::checkSegments(double time) {
-  if (!d_.model.finite()) return;
+void DivergenceChecks::checkEachSegment(double time) {
   const std::string nodes = d_.ties.findCollapsedSegment();
   if (!nodes.empty())
     throw Diverged(start(time) + "the segment of nodes " + nodes + " has collapsed to a line or a point");

@@ -329,6 +329,7 @@ void Dynamics::rememberIncrement() {
 }
 
 void Dynamics::setForceVelocities(double aheadOfLagged, double aheadOfPredicted) {
+  if (!has(Field::lagged) && !has(Field::predicted)) return;
   for (Field f : {Field::lagged, Field::predicted}) {
     if (!has(f)) continue;
     double *v = field(f), *w = v + 3 * model.nodes();

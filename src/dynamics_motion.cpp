@@ -7,6 +7,7 @@ namespace tiefmu {
 
 // value += h rate
 void Dynamics::advance(std::size_t count, double h, const double* rate, double* value) {
+  if (count == 0) return;
   ties.eachBlock(count,
                  [&](std::size_t first, std::size_t last) { addScaled(last - first, h, rate + first, value + first); });
 }
@@ -30,7 +31,7 @@ void Dynamics::drift(double h, double ahead) {
     v = step_.data();
     w = stepSpin_.data();
   }
-  springs.turnEnds(h, v, w);
+  if (has(Field::orientation)) springs.turnEnds(h, v, w);
   ties.move(h, v, w);
   advance(layout[Field::angle].count, h, w, field(Field::angle));
   if (!has(Field::position)) return;
@@ -58,7 +59,7 @@ void Dynamics::rates(double* rate) {
   }
   std::copy_n(w, layout[Field::angle].count, of(Field::angle));
   ties.rates(v, w, of(Field::offset), of(Field::segmentRotation));
-  springs.endRates(v, w, of(Field::orientation));
+  if (has(Field::orientation)) springs.endRates(v, w, of(Field::orientation));
   if (has(Field::work)) {
     const Power p = power();
     of(Field::work)[Work::external] = p.external;

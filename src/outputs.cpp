@@ -9,7 +9,7 @@ void Outputs::update() {
   d_.ties.mapMotion(field(Field::velocity), field(Field::spin), field(Field::slaveVelocity), field(Field::slaveSpin));
   updateReactions();
   if (d_.has(Field::slavePosition)) d_.ties.placeSlaves(field(Field::slavePosition));
-  updatePorts();
+  if (!d_.model.ports.empty()) updatePorts();
   if (d_.has(Field::energy)) updateEnergies();
   if (d_.has(Field::powerResidual)) *field(Field::powerResidual) = powerResidual();
   if (d_.has(Field::drift)) *field(Field::drift) = drift();

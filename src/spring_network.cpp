@@ -141,14 +141,12 @@ Vec3 SpringNetwork::spin(const SpringEnd& end, const double* w) const {
 
 // Of the slaves only those of rotation couplings are tracked here, whose spin does not depend on the geometry.
 void SpringNetwork::turnEnds(double h, const double* v, const double* w) {
-  if (model_.oriented.empty()) return;
   slaves_.updateMotion(v, w);
   for (std::size_t k = 0; k < model_.oriented.size(); ++k)
     turnQuaternion(field(Field::orientation) + 4 * k, h * spin(model_.oriented[k], w));
 }
 
 void SpringNetwork::endRates(const double* v, const double* w, double* rate) {
-  if (model_.oriented.empty()) return;
   slaves_.updateMotion(v, w);
   for (std::size_t k = 0; k < model_.oriented.size(); ++k)
     quaternionRate(field(Field::orientation) + 4 * k, spin(model_.oriented[k], w), rate + 4 * k);

@@ -13,12 +13,18 @@ Ties::Ties(const Model& model, const Layout& layout, double* data) : model_(mode
     firstFrame_.push_back(frames_.size());
     if (kinematicsOf(group.coupling).segmentsTurn) frames_.resize(frames_.size() + group.segments());
   }
+  // Offsets of translation couplings never turn, so they have no place in the state.
+  for (std::size_t g = 0; g < model.groups.size(); ++g)
+    geometry_.push_back(
+        {kinematicsOf(model.groups[g].coupling).slavesTurn ? field(Field::offset) : model.slaveOffset.data(),
+         frames_.data() + firstFrame_[g]});
   inverseLength2_.resize(u);
   for (std::size_t j = 0; j < u; ++j) {
     const double length2 = at(model.slaveOffset.data(), j).squaredNorm();
     inverseLength2_[j] = length2 > 0 ? 1 / length2 : 0;
     offsetsTurn_ |= model.finite() && length2 > 0;
   }
+  shapeMoves_ = offsetsTurn_ || !frames_.empty();
   bias_ = model.finite() && u > 0;
   const bool small = has(Field::position) && !model.finite();
   if (small) displacement_.resize(3 * static_cast<std::size_t>(model.nodes()));
@@ -42,12 +48,6 @@ void Ties::startThreads() {
   } catch (const std::system_error& e) {
     throw SceneError("integrator.threads is " + text(threads) + ", more than the system gives: " + e.what());
   }
-}
-
-TieGeometry Ties::geometry(std::size_t g) const {
-  // Offsets of translation couplings never turn, so they have no place in the state.
-  const bool turning = kinematicsOf(model_.groups[g].coupling).slavesTurn;
-  return {turning ? field(Field::offset) : model_.slaveOffset.data(), frames_.data() + firstFrame_[g]};
 }
 
 void Ties::updateFramesAtStart() {
@@ -106,7 +106,10 @@ void Ties::distributeLoads(const double* force, const double* moment, double* f,
       tiefmu::distributeLoads(group, {first, last}, geometry(g), force, moment, f, t);
     };
     const std::vector<int>& end = group.partEnd;
-    eachInPhases(group, [&](int k) { part(k == 0 ? 0 : end[k - 1], end[k]); });
+    if (end.size() == 1)
+      part(0, end[0]);
+    else
+      eachInPhases(group, [&](int k) { part(k == 0 ? 0 : end[k - 1], end[k]); });
   }
 }
 
@@ -164,6 +167,7 @@ double Ties::largestSpin2(const double* v, const std::vector<std::vector<std::ui
 
 void Ties::move(double h, const double* v, const double* w) {
   ++changes_;
+  if (!shapeMoves_) return;
   const bool turns = has(Field::segmentRotation);
   eachPart([&](const TieGroup& group, SegmentRange range, TieGeometry shape, std::size_t g) {
     if (group.coupling == Coupling::rotation && offsetsTurn_)

@@ -26,12 +26,13 @@ class Ties {
   // --- geometry
   void updateGeometry();       // frames and offsets at the present positions and rotations; finite rotations only
   void updateFramesAtStart();  // frames at the start positions, where small displacements keep them
+  bool someCollapsed() const { return !noneCollapsed_; }  // since the last look
   // Node ids of a meanMotion segment whose nodes have come to lie on a line, so that its motion is not defined: "1, 2,
   // 3". Empty: none.
   std::string findCollapsedSegment();
   // Counts them; a mass matrix that was made at the same number is that of the present geometry.
   std::int64_t changes() const { return changes_; }
-  TieGeometry geometry(std::size_t group) const;
+  const TieGeometry& geometry(std::size_t group) const { return geometry_[group]; }
   const std::vector<SegmentFrame>& frames() const { return frames_; }
   std::size_t firstFrame(std::size_t group) const { return firstFrame_[group]; }
   bool offsetsTurn() const { return offsetsTurn_; }  // in rotation groups, where they are states
@@ -70,6 +71,7 @@ class Ties {
   // As eachGroup, shared among threads: ranges that cover each group once. `body` may write what belongs to its
   // segments.
   template <class Body> void eachPart(Body body) const;
+  template <class Body> void shareBlocks(std::size_t count, Body body) const;
   bool has(Field f) const { return layout_[f].count > 0; }
   double* field(Field f) const { return data_ + layout_[f].offset; }
 
@@ -78,13 +80,14 @@ class Ties {
   double* data_;
   std::vector<SegmentFrame> frames_;
   std::vector<std::size_t> firstFrame_;    // per group
+  std::vector<TieGeometry> geometry_;      // per group
   std::vector<double> inverseLength2_;     // per turning slave: 1/d0^2, 1/m2
   std::vector<double> displacement_;       // small displacements: x - X, m
   std::vector<double> us_, turns_;         // scratch: slaves' displacements or velocities
   std::atomic<bool> noneCollapsed_{true};  // no kernel has met a collapsed segment since the last look
   std::unique_ptr<ThreadPool> pool_;       // none where one thread does it all
   std::int64_t changes_ = 0;
-  bool offsetsTurn_ = false, bias_ = false;
+  bool offsetsTurn_ = false, shapeMoves_ = false, bias_ = false;
 };
 
 template <class Body> void Ties::eachGroup(Body body) const {
@@ -118,8 +121,13 @@ template <class Body> void Ties::each(int count, const Body& body) const {
 }
 
 template <class Body> void Ties::eachBlock(std::size_t count, Body body) const {
+  if (!pool_) return body(std::size_t{0}, count);  // small, so that it is inlined
+  shareBlocks(count, body);
+}
+
+template <class Body> void Ties::shareBlocks(std::size_t count, Body body) const {
   constexpr std::size_t smallest = 4096, most = 64;
-  const std::size_t blocks = pool_ ? std::clamp<std::size_t>(count / smallest, 1, most) : 1;
+  const std::size_t blocks = std::clamp<std::size_t>(count / smallest, 1, most);
   if (blocks == 1) return body(std::size_t{0}, count);
   pool_->each(static_cast<int>(blocks), [&](int k) { body(count * k / blocks, count * (k + 1) / blocks); });
 }
