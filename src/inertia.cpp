@@ -10,8 +10,6 @@
 namespace tiefmu {
 namespace {
 
-// Up to this many unknowns (3-vectors) a fresh factor at every geometry costs little, and is exact to rounding.
-constexpr std::size_t smallSystem = 40;
 // Below this tolerance a constant factor of the translations is cheaper than iterations.
 constexpr double manyDigits = 1e-6;
 
@@ -166,9 +164,14 @@ std::unique_ptr<ConsistentInertia> ConsistentInertia::of(const Model& model, con
 
 bool ConsistentInertia::iterates(const Model& model, const std::vector<int>& nodes) {
   const int rotating = model.rotating() - model.freeBegin();
-  const auto unknowns =
-      nodes.size() + static_cast<std::size_t>(std::lower_bound(nodes.begin(), nodes.end(), rotating) - nodes.begin());
-  return unknowns > smallSystem && (model.turning() > 0 || model.settings.solverTolerance >= manyDigits);
+  const auto turning = std::lower_bound(nodes.begin(), nodes.end(), rotating) - nodes.begin();
+  const bool small = static_cast<int>(nodes.size() + turning) <= smallSystem;
+  if (model.turning() == 0) return !small && model.settings.solverTolerance >= manyDigits;
+  // Only a factor shows whether the slaves give enough to nodes that have nothing of their own.
+  const auto own = [&](const std::vector<double>& inertia, std::ptrdiff_t count) {
+    return std::all_of(nodes.begin(), nodes.begin() + count, [&](int i) { return inertia[model.freeBegin() + i] > 0; });
+  };
+  return !small || (!nodes.empty() && own(model.nodeMass, std::ssize(nodes)) && own(model.nodeInertia, turning));
 }
 
 }  // namespace tiefmu

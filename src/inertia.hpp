@@ -54,10 +54,12 @@ struct Correction { double residual = 0, energy = 0; };
 // geometry, right side and guess alone, so that a restored state continues with the same bits.
 class ConsistentInertia {
  public:
-  // Of these free nodes (ascending, from 0), all other corners of whose segments are not free. Factored where the
-  // system is small, or constant and one number a node and wanted to many digits; solved by conjugate gradients else.
+  // Of these free nodes (ascending, from 0), all other corners of whose segments are not free. Factored where it is one
+  // number a node and small or wanted to many digits, and where it is small with nodes that have no inertia of their
+  // own; solved by conjugate gradients else.
   static std::unique_ptr<ConsistentInertia> of(const Model& model, const std::vector<int>& nodes);
   static bool iterates(const Model& model, const std::vector<int>& nodes);  // is it solved by conjugate gradients?
+  static constexpr int smallSystem = 40;  // unknowns, 3-vectors: up to so many are solved to rounding
   virtual ~ConsistentInertia() = default;
 
   // Does the matrix stay as it is at the start? (Small displacements, or no offset that turns.)

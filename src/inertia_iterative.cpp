@@ -10,6 +10,7 @@ namespace tiefmu {
 namespace {
 
 constexpr int maxIterations = 400;
+constexpr double digits = 1e-14;  // of small systems, whatever tolerance is asked for: there they cost little
 constexpr int foursABlock = 512;  // of nodes that one thread takes; sums do not depend on how many there are
 
 const SurfaceKernels& kernels() {
@@ -67,6 +68,7 @@ class Iterative : public ConsistentInertia {
   [[noreturn]] void refuseOne() const;
 
   int width_, fours_;
+  bool small_;
   std::vector<int> modelNode_;  // of each number
   SurfaceNodes nodes_;
   std::vector<Group> groups_;
@@ -78,7 +80,10 @@ class Iterative : public ConsistentInertia {
 };
 
 Iterative::Iterative(const Model& model, const std::vector<int>& nodes)
-    : ConsistentInertia(model, nodes), width_(freeRotating_ > 0 ? 6 : 3), fours_((free_ + 3) / 4) {
+    : ConsistentInertia(model, nodes),
+      width_(freeRotating_ > 0 ? 6 : 3),
+      fours_((free_ + 3) / 4),
+      small_(free_ + freeRotating_ <= smallSystem) {
   for (int i : node_) modelNode_.push_back(model.freeBegin() + i);
   nodes_ = {modelNode_.data(), freeRotating_};
   std::size_t mostParts = 0;
@@ -358,6 +363,7 @@ Correction Iterative::finish(const Ties& ties, double tolerance, double* a, doub
   }
   // Beside nodes whose own mass is out of all proportion the others must not get lost.
   constexpr double rounding = 1e-15;
+  if (small_) tolerance = std::min(tolerance, digits);
   const double target = std::max(tolerance * tolerance * now_.shared, rounding * rounding * now_.size);
   Correction correction{now_.residual, 0};
   Sums now = now_;
