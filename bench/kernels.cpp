@@ -5,7 +5,8 @@
 //                                  slave motion. CASE: default, default-rotations or optimized, then in this order
 //                                  -welds1, -welds4 (quads apart from each other with so many slaves; else a surface
 //                                  of quads with four each), -light (slaves a quarter as heavy), -flipped (the loads
-//                                  on the masters change sign before every step), -long (a hundred substeps a step), -consistent
+//                                  on the masters change sign before every step), -long (a hundred substeps a step),
+//                                  -consistent
 //   tiefmu_bench cycles CASE N COUNT   that many cycles and no timing, for instruction counts
 //   tiefmu_bench memory CASE N     bytes per slave of an FMU's simulation, its model included
 //   tiefmu_bench search N [shuffled]   both searches of N slaves on N/4 segments
@@ -48,7 +49,7 @@ struct Case {
   std::string name, coupling;
   bool consistent, flipped, light;
   int substeps = 1;  // of a step
-  int welds = 0;  // slaves of each quad that stands apart; 0: a surface
+  int welds = 0;     // slaves of each quad that stands apart; 0: a surface
   bool take(const char* ending) {
     if (!coupling.ends_with(ending)) return false;
     coupling.resize(coupling.size() - std::strlen(ending));
