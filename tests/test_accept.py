@@ -395,10 +395,17 @@ def test_a_run_that_stops_has_failed(example, capsys):
 
 
 def test_the_table_is_printed_whatever_becomes_of_the_files(example, built, capsys):
-    Path("taken").write_text("")
+    Path("taken/01-share_of_master_3.png").mkdir(parents=True)
     assert main(["accept", str(built), "criteria.toml", "--pictures", "taken"]) == 2
     out, error = capsys.readouterr()
-    assert out.endswith("all 9 criteria passed\n") and error.startswith("error: taken: ")
+    assert out.endswith("all 9 criteria passed\n")
+    assert error == "error: taken/01-share_of_master_3.png: Is a directory\n"
+    for option, path, kind in (
+        ("--pictures", "weld.toml", "is a file; give a folder"),
+        ("--junit", "taken", "is a folder; give a file"),
+    ):
+        assert main(["accept", str(built), "criteria.toml", option, path]) == 2
+        assert capsys.readouterr() == ("", f"error: {path}: {kind}\n")
 
 
 SIGNAL = 'signal = "master[1].f[3]"'
@@ -438,6 +445,10 @@ WRONG = [
         f"{LIMIT}at_most = 1\nwindow = [7, 8]",
         "criterion 'limit 1': window = [7, 8]: holds 0 of the values, which go from 0 to 0.01 s; give a window with at "
         "least two",
+    ),
+    (
+        f"{LIMIT}at_most = 1\nwindow = [0, 0.02]",
+        "criterion 'limit 1': window = [0, 0.02]: the values go from 0 to 0.01 s only; give a window that they fill",
     ),
     (
         f"[run]\nstep = 1e-3\n{LIMIT}at_most = 1\nfilter = 1000",

@@ -39,6 +39,10 @@ def add_parser(commands) -> None:
 def run_accept(options: argparse.Namespace) -> int:
     if options.junit:
         check_folder_of(options.junit)
+        if options.junit.is_dir():
+            raise UsageError(f"{options.junit}: is a folder; give a file")
+    if options.pictures and options.pictures.exists() and not options.pictures.is_dir():
+        raise UsageError(f"{options.pictures}: is a file; give a folder")
     with fmu_of(options.model) as (path, _), Fmu(path, options.model) as fmu:
         criteria, folder, name = options.criteria, None, str(options.criteria)
         if criteria is None:

@@ -149,7 +149,8 @@ def band(label: str, row: Band, unit: str, t: np.ndarray, x: np.ndarray, given: 
         bool(distance[worst] <= width),
         f"at most {width:.4g} from the reference",
         unit,
-        f"{named(row)}; worst at t = {times[worst]:.6g} s; {len(times)} times of the {row.at}, {said}",
+        f"{named(row)}; worst at t = {times[worst]:.6g} s; {len(times)} times of the {row.at} from "
+        f"{times[0]:g} to {times[-1]:g} s, {said}",
         curves=[Curve("run", t, x), Curve("reference", rt, rx)],
         corridor=(times, expected - width, expected + width),
     )
@@ -171,7 +172,8 @@ def rating(label: str, row: Rating, unit: str, t: np.ndarray, x: np.ndarray, giv
         bool(grades[row.of] >= row.least),
         f"{row.of} rating at least {row.least:g}",
         "1",
-        f"{named(row)}; ISO/TS 18571 at 10 kHz: " + ", ".join(f"{key} {value:.3g}" for key, value in grades.items()),
+        f"{named(row)}; ISO/TS 18571 at 10 kHz from {start:g} to {end:g} s: "
+        + ", ".join(f"{key} {value:.3g}" for key, value in grades.items()),
         curves=[Curve("run", t, x), Curve("reference", rt, rx)],
     )
 

@@ -114,7 +114,7 @@ def coefficients(frequency_class: int, step: float) -> tuple[np.ndarray, np.ndar
 
 
 def cut(time: np.ndarray, values: np.ndarray, window: tuple[float, float] | None) -> Points:
-    """What lies in the window. Raises UsageError where that is less than two rows."""
+    """What lies in the window. Raises UsageError where that is less than two rows, or a part of the window has none."""
     if window is None:
         return time, values
     inside = (time >= window[0]) & (time <= window[1])
@@ -122,6 +122,12 @@ def cut(time: np.ndarray, values: np.ndarray, window: tuple[float, float] | None
         raise UsageError(
             f"window = [{window[0]:g}, {window[1]:g}]: holds {inside.sum()} of the values, which go from {time[0]:g} "
             f"to {time[-1]:g} s; give a window with at least two"
+        )
+    step = (time[-1] - time[0]) / (len(time) - 1)
+    if window[0] < time[0] - step or window[1] > time[-1] + step:
+        raise UsageError(
+            f"window = [{window[0]:g}, {window[1]:g}]: the values go from {time[0]:g} to {time[-1]:g} s only; give a "
+            "window that they fill"
         )
     return time[inside], values[inside]
 
