@@ -129,6 +129,14 @@ def test_a_run_as_a_moving_mesh(weld, scene_file):
     assert np.ptp(result["slave[1].r[1]"]) > 1e-3
 
 
+@pytest.mark.parametrize("frames, rows", [(1, [0]), (2, [0, 20]), (4, [0, 7, 14, 20]), (6, [0, 4, 8, 12, 16, 20])])
+def test_the_frames_of_a_run_go_to_its_end(weld, scene_file, frames, rows):
+    arguments = ["run", scene_file(weld), "--stop-time", "0.02", "--step", "0.001", "--pvd", "run.pvd"]
+    assert main([*arguments, "--frames", str(frames)]) == 0
+    sets = ElementTree.parse("run.pvd").getroot().findall("Collection/DataSet")
+    assert [float(one.get("timestep")) for one in sets] == pytest.approx([1e-3 * row for row in rows])
+
+
 def test_an_fmu_that_shows_no_positions(weld, scene_file, capsys):
     scene = scene_file(weld)
     assert main(["build", scene]) == 0

@@ -158,8 +158,9 @@ class Companion:
 
 
 class PvdFile:
-    """Takes a run block by block: a VTU file for every k-th row in a folder beside PATH, and PATH, a collection of them
-    with their times. Points move; fields velocity (m/s) of nodes and slaves, reaction (N) of masters."""
+    """Takes a run block by block: a VTU file for every k-th row, and for the last one, in a folder beside PATH, and
+    PATH, a collection of them with their times. Points move; fields velocity (m/s) of nodes and slaves, reaction (N) of
+    masters."""
 
     def __init__(
         self, path: Path, scene: Scene | None, found: dict, names: list[str], plan: Experiment, frames: int = FRAMES
@@ -174,11 +175,11 @@ class PvdFile:
             self.motion = Companion(scene, found, plan)
         else:
             self.motion = Columns(path, self.geometry, found, names, plan)
-        self.every = max(1, int(np.ceil(plan.rows / frames)))
+        self.every = max(1, int(np.ceil((plan.rows - 1) / max(frames - 1, 0.5) * (1 - 1e-9))))
         frames = int(min(frames, plan.rows))
         self.bar = tqdm(total=frames, unit="frame", delay=2, disable=None, leave=False, desc=path.name)
         self.folder = path.with_name(path.stem + "_frames")
-        self.count, self.written = 0, []
+        self.count, self.written, self.frames = 0, [], frames
         self.folder.mkdir(exist_ok=True)
         self.collection = ElementTree.Element("VTKFile", type="Collection", version="0.1", byte_order="LittleEndian")
         self.sets = ElementTree.SubElement(self.collection, "Collection")
@@ -188,10 +189,11 @@ class PvdFile:
             self.motion.follow(row)
             if self.count % self.every == 0:
                 self.frame(row)
-                self.bar.update()
             self.count += 1
+        self.last = block[-1].copy()
 
     def frame(self, row: np.ndarray) -> None:
+        self.bar.update()
         r, v, f = self.motion.look(row)
         feet = self.geometry.projections(r[: len(self.geometry.ids)])
         still = np.zeros_like(feet)
@@ -210,6 +212,8 @@ class PvdFile:
             self.folder.rmdir()
 
     def close(self) -> None:
+        if (self.count - 1) % self.every and len(self.written) < self.frames:
+            self.frame(self.last)
         self.bar.close()
         ElementTree.indent(self.collection)
         ElementTree.ElementTree(self.collection).write(self.path, encoding="utf-8", xml_declaration=True)
