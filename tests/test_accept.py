@@ -249,6 +249,33 @@ def test_agreement_with_half_the_step(folder, result):
     assert not one(folder, f"[health]\nhalf_step = {0.99 * found.value}").passed
 
 
+def test_rounding_is_no_difference_from_half_the_step(tmp_path, capsys):
+    """A symmetric part of which nothing turns: its spins are rounding, and differ by all of their size."""
+    corners = [[1, 61.2345, -23.777], [2, 61.3345, -23.777], [3, 61.3345, -23.677], [4, 61.2345, -23.677]]
+    scene = {
+        "mesh": {
+            "nodes": [[*corner, 1.131] for corner in corners] + [[9, 61.2845, -23.727, 1.171]],
+            "segments": [[1, 1, 2, 3, 4]],
+        },
+        "node": [{"nodes": "all", "motion": "free", "mass": 1.0}],
+        "tie": [{"segments": "all", "slaves": [9], "formulation": "optimized"}],
+        "spring": [{"ground": [1, 2, 3, 4], "kind": "bushing", "stiffness": 1e5}],
+    }
+    tiefmu.build(tiefmu.load(scene), tmp_path / "plate.fmu")
+    (tmp_path / "in.csv").write_text("time,slave[1].f[3]\n0,0\n0.005,100\n0.02,0\n")
+    [found] = verdicts(tmp_path, "[health]\nhalf_step = 0.02").values()
+    assert 1e-4 < found.value < 0.02 and found.where.startswith(("master.v", "slave.v", "master.f"))
+    rows = fmpy.simulate_fmu(
+        str(tmp_path / "plate.fmu"),
+        input=np.genfromtxt(tmp_path / "in.csv", delimiter=",", names=True, deletechars=""),
+        stop_time=END,
+        output_interval=STEP,
+        validate=False,
+    )
+    spins = norm(rows, ["slave[1].w"])
+    assert 0 < spins.max() < 1e-9 * norm(rows, ["slave[1].v"]).max()
+
+
 def test_dropped_slaves_are_counted(weld, tmp_path):
     weld["mesh"]["nodes"].append([102, 9, 9, 9])
     weld["tie"][0] |= {"slaves": [101, 102], "unresolved": "drop"}

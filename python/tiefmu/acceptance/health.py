@@ -15,6 +15,7 @@ from .criteria import HEALTH, Health
 from .verdict import Curve, Verdict
 
 MOTION = re.compile(r"(\w+)\[.*\]\.([vwft])\[[123]\]")  # what a run at half the step is compared by
+NOISE = 1e-9  # 1/m or m between translations and rotations: far below any part's share, far above rounding
 EXPOSED = {  # criterion: (output, what exposes it)
     "energy_residual": ("energy.residual", "energy"),
     "drift": ("drift", "drift"),
@@ -144,7 +145,7 @@ def ratio(added: float, own: float) -> float:
 
 def half_step(most: float, result: Result, half: Result) -> Verdict:
     """Relative L2 difference of velocities and loads over the run, the worst of the kinds, at the steps of the coarse
-    run."""
+    run. A kind that is but rounding beside another of motion or of loads (NOISE) is taken relative to that one."""
     time, fine = result["time"], half["time"]
     place = np.clip(np.searchsorted(fine, time), 1, len(fine) - 1)
     place = place - (time - fine[place - 1] < fine[place] - time)
@@ -157,10 +158,12 @@ def half_step(most: float, result: Result, half: Result) -> Verdict:
         if match:
             kinds.setdefault(f"{match[1]}.{match[2]}", []).append(name)
     worst, what, curve = 0.0, "no motion and no load", np.zeros(int(common.sum()))
+    finer = {kind: np.array([half[name][place[common]] for name in names]) for kind, names in kinds.items()}
+    norms = {kind: float(np.linalg.norm(b)) for kind, b in finer.items()}
     for kind, names in kinds.items():
-        a = np.array([result[name][common] for name in names])
-        b = np.array([half[name][place[common]] for name in names])
-        scale = float(np.linalg.norm(b))
+        a, b = np.array([result[name][common] for name in names]), finer[kind]
+        alike = "vw" if kind[-1] in "vw" else "ft"
+        scale = max(norms[kind], *(NOISE * norms[other] for other in norms if other[-1] in alike))
         error = float(np.linalg.norm(a - b)) / scale if scale > 0 else float(np.linalg.norm(a))
         if not np.isfinite(error):
             raise RunStopped(f"half_step: {kind} holds values that are not finite")
