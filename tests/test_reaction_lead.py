@@ -9,7 +9,7 @@ import tiefmu
 from fmu_calls import ERROR, OK, Fmu, Instance
 from port_scenes import ported
 from tiefmu._core import StepTooLong
-from tiefmu.study import limits
+from tiefmu.study import limits, stability_map
 
 CORNERS = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
 PHI = np.array([0.28, 0.12, 0.18, 0.42])  # of the slave at (0.3, 0.6)
@@ -190,6 +190,23 @@ def test_lead_damps_as_one_of_the_host():
         found = np.log(roots[np.abs(roots) > 1e-12].astype(complex)) / step
         rate = float(found[np.abs(found - 1j).argmin()].real)
         assert rate == pytest.approx(step * (r * (1 - lead) + 0.5 - lead) * r / (2 * (1 + r)), rel=0.02)
+
+
+@pytest.mark.parametrize("r", [0.1, 0.5])
+@pytest.mark.parametrize("reaction", ["split", "full"])
+def test_without_delay_it_is_of_second_order(reaction, r):
+    """At theta = (r + 1/2)/(r + 1) and (1 - r)/2 (theory 5.9, 5.11), of first order at others."""
+    best = (r + 0.5) / (r + 1) if reaction == "split" else (1 - r) / 2
+
+    def order(lead):
+        scene, errors = limits.plate(4 * r, reaction, reaction_lead=lead), []
+        for step in (0.02, 0.01):
+            roots = limits.coupled(scene, reaction, step, omega=1.0).roots()
+            errors.append(stability_map.worst(roots, r, step, 0.0))
+        return np.log2(errors[0] / errors[1])
+
+    assert order(best) == pytest.approx(2, abs=0.05)
+    assert order(1.0) == pytest.approx(1, abs=0.2)
 
 
 # ------------------------------------------------------------------------------------------------------------ the state

@@ -311,8 +311,15 @@ def hole_values() -> list[Value]:
 
 
 def heavy_limits() -> list[Limit]:
-    """The FMU owns the masters: central difference whatever the mass ratio (theory 5.10)."""
+    """The FMU owns the masters: central difference whatever the mass ratio, theory (5.10). Leads on an undamped host,
+    which takes longer to grow than a run lasts, theory (5.13)."""
     return [
+        led(case, square, lead, inside)
+        for case, square, lead, inside in (
+            ("last change held too", 2 / 9, 1.0, 0.0),
+            ("lead inside the FMU", 3 / 32, 0.0, 1.0),
+        )
+    ] + [
         Limit(
             "9",
             f"free, r = {r:g}, zeta = {zeta:g}",
@@ -325,19 +332,36 @@ def heavy_limits() -> list[Limit]:
     ]
 
 
+def led(case: str, square: float, lead: float, inside: float) -> Limit:
+    """square: of H omega, times r."""
+    r = 100.0
+    scene = plate(4 * r, "split", reaction_lead=inside)
+    return Limit(
+        "9",
+        f"split, {case}, r = {r:g}, zeta = 0",
+        "H omega",
+        np.sqrt(square / r),
+        None,
+        lambda x: coupled(scene, "split", x, omega=1.0, lead=lead).radius(),
+    )
+
+
 def heavy_values() -> list[Value]:
     """Errors of the worst vibration's frequency, undamped host: theory (5.8), (5.9), (5.10)."""
     x, found = 1e-3, []
     for r in (1.0, 10.0, 100.0):
 
-        def error(reaction, step, r=r, **way):
-            return worst(coupled(plate(4 * r, reaction), reaction, step, omega=1.0, **way).roots(), r, step, 0.0)
+        def error(reaction, step, r=r, reaction_lead=0.0, **way):
+            scene = plate(4 * r, reaction, reaction_lead=reaction_lead)
+            return worst(coupled(scene, reaction, step, omega=1.0, **way).roots(), r, step, 0.0)
 
         for name, step, closed, measured in (
             ("full closed, held", x, x * r / (4 * np.sqrt(1 + r)), error("full", x, closed=True)),
             ("full closed, linear", 50 * x, 5 / 24 * r / (1 + r) * (50 * x) ** 2,
              error("full", 50 * x, order=1, closed=True)),
             ("split, last change held too", x, x * r / (4 * (1 + r)), error("split", x, lead=1.0)),
+            ("split, lead inside the FMU", x / 10, x / 10 * r / (4 * (1 + r)),
+             error("split", x / 10, reaction_lead=1.0)),
             ("free", 50 * x, (50 * x) ** 2 / 24, worst(owned(r, 50 * x, 1.0, 0.0).roots(), r, 50 * x, 0.0)),
         ):  # fmt: skip
             found.append(Value("9", f"{name}, r = {r:g}, H omega = {step:g}", "error", closed, measured, 0.05))
