@@ -161,8 +161,8 @@ def test_reference_against_dop853(scene, reaction):
 def test_fmu_gives_the_bits_of_the_solver():
     """The same loop with the packaged FMU and with the solver in process."""
     one = coupling_runs.Study(SCENES / "spotweld.toml")
-    for reaction in coupling_runs.REACTIONS:
-        scene = one.scene(reaction)
+    for way in coupling_runs.WAYS:
+        reaction, scene = way.reaction, one.scene(way.reaction, reaction_lead=way.reaction_lead)
         with Packaged(scene) as packaged:
             inside = InProcess(scene)
             runs = [

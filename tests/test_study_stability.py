@@ -115,7 +115,7 @@ def test_what_works_at_heavy_tied_mass(ratio):
     assert {"full-closed-linear", "free"} <= green
     assert not green & {"loads", "full", "split"}
     if ratio > 10:
-        assert not green & {"split-lead", "split-linear"}
+        assert not green & {"split-lead-inside", "split-lead", "split-linear"}
 
 
 @pytest.mark.parametrize("ratio", [2.0, 50.0])

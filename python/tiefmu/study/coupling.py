@@ -8,8 +8,7 @@ from ..arguments import positive
 from ..errors import UsageError
 from . import page
 from .coupling_charts import INTRO, draw, section
-from .coupling_runs import REACTIONS, WINDOW, Row, Study
-from .hosts import EXTRAPOLATIONS
+from .coupling_runs import WAYS, WINDOW, Row, Study
 
 TIMES = ["cpu"]  # columns that differ from run to run
 
@@ -56,7 +55,7 @@ def run(options) -> int:
     studies = [Study(path, options.host, options.mass_ratio) for path in options.scene]
     options.out.mkdir(parents=True, exist_ok=True)
     steps, sections, interrupted = ladder(options.decades), [], False
-    total = len(studies) * len(REACTIONS) * len(EXTRAPOLATIONS) * sum(steps)
+    total = len(studies) * sum(len(way.extrapolations) for way in WAYS) * sum(steps)
     with tqdm(
         total=total,
         delay=2,

@@ -5,10 +5,17 @@ from pathlib import Path
 
 from .. import figures
 from . import page
-from .coupling_runs import OMEGA, REACTIONS, ZETA, Row, Study
+from .coupling_runs import OMEGA, WAYS, ZETA, Row, Study
 from .hosts import EXTRAPOLATIONS
 
-COLOURS = {"loads": "#b8860b", "full": "#b3402e", "split": "#1f5fa8", "spring-damper": "#3b7d4f"}
+COLOURS = {
+    "loads": "#b8860b",
+    "full": "#b3402e",
+    "split": "#1f5fa8",
+    "split-lead-inside": "#56a7d8",
+    "full-closed": "#8f4fa8",
+    "spring-damper": "#3b7d4f",
+}
 STYLES = {"held": "-", "linear": "--", "quadratic": ":"}
 MARKERS = {"held": "o", "linear": "s", "quadratic": "^"}
 
@@ -23,7 +30,7 @@ def draw(rows: list[Row], folder: Path, name: str) -> Path:
         ("power_residual_relative", "power residual"),
     ]
     figure, axes = figures.pyplot().subplots(2, 2, figsize=(12, 9.5), sharex=True, layout="constrained")
-    ways = [(reaction, style) for reaction in REACTIONS for style in EXTRAPOLATIONS]
+    ways = [(way.name, style) for way in WAYS for style in way.extrapolations]
     for place, (reaction, style) in enumerate(ways):
         own = [row for row in rows if (row.reaction, row.extrapolation) == (reaction, style)]
         good = [row for row in own if row.status == "stable"]
@@ -77,6 +84,9 @@ INTRO = [
     f"with {100 * ZETA:g} % damping, unless the host is rigid. Between communication points it solves its own "
     "equations exactly under the tie's last load - held, or extrapolated linearly or quadratically - so the error is "
     "that of the coupling. Smooth pulses act on the slaves; the exact solution is the monolithic system.",
+    "'split-lead-inside' is 'split' with reaction_lead = 1 in the scene: what the host holds runs ahead, and the loads "
+    "that are compared with the exact ones do so, too. 'full-closed' is 'full' with a host that solves for its "
+    "accelerations by the FMU's directional derivatives.",
     "'loads' is lumped, so its error cannot fall below that of lumping. 'spring-damper' exchanges a force: the slaves "
     "weigh nothing and hang on springs and dampers inside the FMU. The power residual is sum f.v at a communication "
     "point with the load that the host has used, minus with the load that the tie answers there.",
@@ -96,7 +106,7 @@ def section(study: Study, rows: list[Row], figure: Path) -> page.Section:
 def verdict(rows: list[Row]) -> str:
     """Largest stable step of each reaction and extrapolation."""
     words = []
-    for reaction in REACTIONS:
+    for reaction in [way.name for way in WAYS]:
         for style in EXTRAPOLATIONS:
             own = [row for row in rows if (row.reaction, row.extrapolation) == (reaction, style)]
             good = [row.step_omega for row in own if row.status == "stable"]

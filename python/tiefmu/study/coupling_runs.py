@@ -19,16 +19,37 @@ ZETA = 0.05  # of the host
 EXCHANGE_ZETA = 0.25
 WINDOW = 2.0  # simulated time in radians of that spring
 AMPLITUDE = 1e-4  # of the mean edge of a segment: what is seen is the coupling, not the geometry
-REACTIONS = ["loads", "full", "split", "spring-damper"]
 LARGEST_MATRIX = 200  # rows of a one-step map
 MAX_STEPS = 6000  # of a run in its place
+
+
+@dataclass(frozen=True)
+class Way:
+    """A way to couple, theory 5. reaction, reaction_lead: of the scene; reaction "spring-damper": force exchange with
+    massless slaves on springs and dampers to ground; closed: of the host, see `Coupling`."""
+
+    name: str
+    reaction: str
+    extrapolations: tuple[str, ...] = tuple(EXTRAPOLATIONS)
+    reaction_lead: float = 0.0
+    closed: bool = False
+
+
+WAYS = [
+    Way("loads", "loads"),
+    Way("full", "full"),
+    Way("split", "split"),
+    Way("split-lead-inside", "split", ("held",), reaction_lead=1.0),
+    Way("full-closed", "full", ("held", "linear"), closed=True),
+    Way("spring-damper", "spring-damper"),
+]
 
 
 @dataclass
 class Row:
     scene: str
     host: str
-    reaction: str  # or "spring-damper": force exchange with massless slaves on springs and dampers to ground
+    reaction: str  # name of a Way
     extrapolation: str  # of the tie's loads, by the host
     mass_ratio: float  # slaves over masters
     step: float  # s
@@ -128,8 +149,9 @@ class Study:
             change(tables.model, reaction=reaction, inertia="lumped" if reaction == "loads" else "consistent")
         return tables
 
-    def scene(self, reaction: str, geometry: str | None = None) -> Scene:
+    def scene(self, reaction: str, geometry: str | None = None, reaction_lead: float = 0.0) -> Scene:
         tables = self.tables(reaction)
+        change(tables.model, reaction_lead=reaction_lead)
         if geometry:
             change(tables.model, geometry=geometry)
         return self.source.compile(tables)
@@ -145,35 +167,32 @@ class Study:
         )
 
     def rows(self, steps: list[int]):
-        """One Row for each reaction, extrapolation and number of steps."""
+        """One Row for each way, extrapolation and number of steps."""
         references = {}
-        for reaction in REACTIONS:
-            kind = "spring-damper" if reaction == "spring-damper" else "tie"
+        for way in WAYS:
+            kind = "spring-damper" if way.reaction == "spring-damper" else "tie"
             if kind not in references:
-                references[kind] = Reference(self, reaction)
-            linear = InProcess(self.scene(reaction, "small"))
-            with Packaged(self.scene(reaction)) as tie:
-                for order, extrapolation in enumerate(EXTRAPOLATIONS):
+                references[kind] = Reference(self, way.reaction)
+            linear = InProcess(self.scene(way.reaction, "small", way.reaction_lead))
+            with Packaged(self.scene(way.reaction, reaction_lead=way.reaction_lead)) as tie:
+                for extrapolation in way.extrapolations:
                     for count in steps:
-                        yield self.row(tie, linear, references[kind], reaction, order, extrapolation, count)
+                        yield self.row(tie, linear, references[kind], way, extrapolation, count)
 
     def row(
-        self,
-        tie: Packaged,
-        linear: InProcess,
-        reference: "Reference",
-        reaction: str,
-        order: int,
-        extrapolation: str,
-        count: int,
+        self, tie: Packaged, linear: InProcess, reference: "Reference", way: Way, extrapolation: str, count: int
     ) -> Row:
-        size, host = self.window / count, self.masses(reaction, tie.added)
-        probe = Coupling(linear, host, size, order)
+        size, host, order = (
+            self.window / count,
+            self.masses(way.reaction, tie.added),
+            EXTRAPOLATIONS.index(extrapolation),
+        )
+        probe = Coupling(linear, host, size, order, closed=way.closed)
         radius = self.rate(probe)
         row = Row(
             scene=self.source.name,
             host=self.host,
-            reaction=reaction,
+            reaction=way.name,
             extrapolation=extrapolation,
             mass_ratio=self.ratio,
             step=size,
@@ -188,7 +207,7 @@ class Study:
             status="diverged",
             cpu=math.nan,
         )
-        run = self.simulate(tie, host, size, order, count)
+        run = self.simulate(tie, host, size, order, count, way.closed)
         if run is None:
             return row
         velocity, load, residual, cpu = run
@@ -212,11 +231,11 @@ class Study:
             return probe.growth(min(steps, MAX_STEPS))
         return probe.radius()
 
-    def simulate(self, tie: Packaged, host: Masses, size: float, order: int, count: int):
+    def simulate(self, tie: Packaged, host: Masses, size: float, order: int, count: int, closed: bool = False):
         """(slave velocities, loads of the tie on the masters, power residuals) at the communication points, and CPU s
         per s; or None where it diverges."""
         tie.restart()
-        coupling = Coupling(tie, host, size, order)
+        coupling = Coupling(tie, host, size, order, closed=closed)
         state, used = coupling.rest(), None
         carried = host.mass - self.own
         velocity = np.empty((count + 1, len(self.direction)))

@@ -183,7 +183,7 @@ class Packaged(Tie):
             instanceName="tie",
             modelIdentifier=description.coSimulation.modelIdentifier,
         )
-        reference = {v.name: v.valueReference for v in description.modelVariables}
+        self.reference = reference = {v.name: v.valueReference for v in description.modelVariables}
 
         def block(names, values):
             """Arguments of fmi2SetReal and fmi2GetReal after the instance."""
@@ -206,6 +206,17 @@ class Packaged(Tie):
     def begin(self):
         self.fmu.instantiate()
         self.restart(reset=False)
+
+    def derivatives(self):
+        """At rest, a call of fmi2GetDirectionalDerivative a column."""
+        n = self.names.freedoms
+        self.move(*np.zeros((3, n)))
+        known = [self.reference[name] for name in self.names.acceleration]
+        unknown = [self.reference[name] for name in self.names.load]
+        found = np.zeros((n, n))
+        for column, one in enumerate(known):
+            found[self.names.loaded, column] = self.fmu.getDirectionalDerivative(unknown, [one], [1.0])
+        return found
 
     def restart(self, reset=True):
         """Back to time 0."""
