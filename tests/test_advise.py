@@ -270,18 +270,22 @@ def test_no_mode_for_a_step_that_is_too_long(tmp_path, capsys):
     assert step < 2e-2 and stability_map.point(said[-1].split()[4], 30.0, 500 * step).green
 
 
-def test_the_mode_is_written(tmp_path, capsys):
-    path = driven(tmp_path, 24.0)
+@pytest.mark.parametrize(
+    "mass, step, tolerance, mode, model",
+    [
+        (24.0, "2e-6", "5e-3", "split", {"reaction": "split"}),
+        (240.0, "4e-5", "5e-2", "split-lead-inside", {"reaction": "split", "reaction_lead": 1.0}),
+    ],
+)
+def test_the_mode_is_written(mass, step, tolerance, mode, model, tmp_path, capsys):
+    path = driven(tmp_path, mass)
     (tmp_path / "a.csv").write_text("time,master[1].v[3],slave[1].f[3]\n0,0,0\n0.01,1,5\n")
     new = tmp_path / "new.toml"
-    arguments = ["advise", str(path), "--host-step", "2e-6", "--host-stiffness", "5e5", "--write", str(new)]
-    assert main([*arguments, "--tolerance", "5e-3"]) == 0
-    assert "reaction: split, " in capsys.readouterr().out
-    assert tomllib.loads(new.read_text())["model"] == {
-        "inertia": "consistent",
-        "geometry": tomllib.loads(new.read_text())["model"]["geometry"],
-        "reaction": "split",
-    }
+    arguments = ["advise", str(path), "--host-step", step, "--host-stiffness", "5e5", "--write", str(new)]
+    assert main([*arguments, "--tolerance", tolerance]) == 0
+    assert f"reaction: {mode}, " in capsys.readouterr().out
+    written = tomllib.loads(new.read_text())["model"]
+    assert written == model | {"inertia": "consistent", "geometry": written["geometry"]}
 
 
 def test_a_deck_gets_advice(capsys):

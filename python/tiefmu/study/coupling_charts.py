@@ -14,6 +14,7 @@ COLOURS = {
     "split": "#1f5fa8",
     "split-lead-inside": "#56a7d8",
     "full-closed": "#8f4fa8",
+    "free": "#222222",
     "spring-damper": "#3b7d4f",
 }
 STYLES = {"held": "-", "linear": "--", "quadratic": ":"}
@@ -86,7 +87,8 @@ INTRO = [
     "that of the coupling. Smooth pulses act on the slaves; the exact solution is the monolithic system.",
     "'split-lead-inside' is 'split' with reaction_lead = 1 in the scene: what the host holds runs ahead, and the loads "
     "that are compared with the exact ones do so, too. 'full-closed' is 'full' with a host that solves for its "
-    "accelerations by the FMU's directional derivatives.",
+    "accelerations by the FMU's directional derivatives. 'free': the solver, in this process, owns the masters and the "
+    "host has their springs; velocities are compared in the middle of a step, where they belong.",
     "'loads' is lumped, so its error cannot fall below that of lumping. 'spring-damper' exchanges a force: the slaves "
     "weigh nothing and hang on springs and dampers inside the FMU. The power residual is sum f.v at a communication "
     "point with the load that the host has used, minus with the load that the tie answers there.",

@@ -9,6 +9,7 @@ import numpy as np
 from .. import schema
 from .._core import Diverged, SceneError
 from ..scene import Scene
+from . import coupling_free
 from .coupling_reference import Reference, relative
 from .hosts import EXTRAPOLATIONS, Coupling, InProcess, Masses, Packaged
 from .limits import GROWS
@@ -26,7 +27,8 @@ MAX_STEPS = 6000  # of a run in its place
 @dataclass(frozen=True)
 class Way:
     """A way to couple, theory 5. reaction, reaction_lead: of the scene; reaction "spring-damper": force exchange with
-    massless slaves on springs and dampers to ground; closed: of the host, see `Coupling`."""
+    massless slaves on springs and dampers to ground; "free": the solver owns the masters; closed: of the host, see
+    `Coupling`."""
 
     name: str
     reaction: str
@@ -41,6 +43,7 @@ WAYS = [
     Way("split", "split"),
     Way("split-lead-inside", "split", ("held",), reaction_lead=1.0),
     Way("full-closed", "full", ("held", "linear"), closed=True),
+    Way("free", "free", ("held",)),
     Way("spring-damper", "spring-damper"),
 ]
 
@@ -114,6 +117,10 @@ class Study:
             )
         )
 
+    def amplitude_velocity(self) -> float:
+        """What the pulses make, m/s, about."""
+        return AMPLITUDE * self.edge() * self.omega
+
     def pulse(self, t: float) -> float:
         """0 before the start, with its first three derivatives, so that an extrapolation's past is exact."""
         return math.sin(math.pi * t / self.window) ** 4 if t > 0 else 0.0
@@ -173,6 +180,10 @@ class Study:
             kind = "spring-damper" if way.reaction == "spring-damper" else "tie"
             if kind not in references:
                 references[kind] = Reference(self, way.reaction)
+            if way.reaction == "free":
+                free = coupling_free.scene(self)
+                yield from (self.free_row(free, references[kind], way, count) for count in steps)
+                continue
             linear = InProcess(self.scene(way.reaction, "small", way.reaction_lead))
             with Packaged(self.scene(way.reaction, reaction_lead=way.reaction_lead)) as tie:
                 for extrapolation in way.extrapolations:
@@ -189,6 +200,30 @@ class Study:
         )
         probe = Coupling(linear, host, size, order, closed=way.closed)
         radius = self.rate(probe)
+        run = self.simulate(tie, host, size, order, count, way.closed)
+        times = np.arange(count + 1) * size
+        return self.judged(run, reference, way, extrapolation, count, radius, times, times)
+
+    def free_row(self, free: Scene, reference: Reference, way: Way, count: int) -> Row:
+        size = self.window / count
+        owner, times = coupling_free.Owner(self, free, size), np.arange(count) * size
+        radius = owner.masters.growth(min(MAX_STEPS, max(400, math.ceil(16 * math.pi / (size * self.omega)))))
+        run = owner.simulate(count)
+        return self.judged(run, reference, way, "held", count, radius, times + size / 2, times)
+
+    def judged(
+        self,
+        run,
+        reference: Reference,
+        way: Way,
+        extrapolation: str,
+        count: int,
+        radius: float,
+        velocity_times: np.ndarray,
+        load_times: np.ndarray,
+    ) -> Row:
+        """run: of `simulate`; times: of its velocities and loads, s."""
+        size = self.window / count
         row = Row(
             scene=self.source.name,
             host=self.host,
@@ -207,12 +242,10 @@ class Study:
             status="diverged",
             cpu=math.nan,
         )
-        run = self.simulate(tie, host, size, order, count, way.closed)
         if run is None:
             return row
         velocity, load, residual, cpu = run
-        times = np.arange(count + 1) * size
-        exact_velocity, exact_load, _exact_power = (reference.at(times, key) for key in ("velocity", "load", "power"))
+        exact_velocity, exact_load = reference.at(velocity_times, "velocity"), reference.at(load_times, "load")
         if not relative(velocity, exact_velocity) < 10:
             return row
         row.error_velocity, row.error_force = relative(velocity, exact_velocity), relative(load, exact_load)
@@ -240,7 +273,7 @@ class Study:
         carried = host.mass - self.own
         velocity = np.empty((count + 1, len(self.direction)))
         load, residual = np.empty((count + 1, len(self.own))), np.zeros(count + 1)
-        bound = 1e6 * AMPLITUDE * self.edge() * self.omega
+        bound = 1e6 * self.amplitude_velocity()
         start = time.process_time()
         for n in range(count + 1):
             tie.push(self.force * self.pulse(n * size) * self.direction)

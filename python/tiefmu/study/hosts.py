@@ -483,9 +483,8 @@ class FreeMasters(Exchange):
 
     watched, rows = 1, 2  # displacements, velocities
 
-    def __init__(self, scene: Scene, stiffness: float, damping: float, step: float):
-        """stiffness, damping: of every master's ground spring, N/m and N s/m. The masters of the scene are free and
-        cannot turn."""
+    def __init__(self, scene: Scene, stiffness, damping, step: float):
+        """stiffness, damping: of every node's ground spring, N/m and N s/m: numbers, or per freedom."""
         self.simulation = scene.simulation()
         self.simulation.initialise(0.0)
         super().__init__(step, self.simulation.get("velocity").size)
@@ -498,12 +497,15 @@ class FreeMasters(Exchange):
     def prepare(self, state):
         self.simulation.set("velocity", state[1])
 
+    def force(self, state: np.ndarray) -> np.ndarray:
+        """What the host sends."""
+        return -self.stiffness * state[0] - self.damping * state[1]
+
     def following(self, state):
-        displacement, velocity = state
-        self.simulation.set("node_force", -self.stiffness * displacement - self.damping * velocity)
+        self.simulation.set("node_force", self.force(state))
         self.simulation.step(self.size)
         after = self.simulation.get("velocity").ravel()
-        return np.array([displacement + self.size * after, after])
+        return np.array([state[0] + self.size * after, after])
 
     def units(self):
         return np.array([1, self.size])
