@@ -110,6 +110,17 @@ template <int N> constexpr int pairOf(int i, int j) {
   return i <= j ? i * N - i * (i - 1) / 2 + j - i : pairOf<N>(j, i);
 }
 
+// body(k) for k in [first, end) and body(i, j) for 0 <= i <= j < N: as types, so that no place is reckoned at run time.
+template <int first, int end, class Body> TIEFMU_INLINE void each(Body body) {
+  if constexpr (first < end) {
+    body(std::integral_constant<int, first>{});
+    each<first + 1, end>(body);
+  }
+}
+template <int N, class Body> TIEFMU_INLINE void eachPair(Body body) {
+  each<0, N>([&](auto i) TIEFMU_INLINED { each<decltype(i)::value, N>([&](auto j) TIEFMU_INLINED { body(i, j); }); });
+}
+
 template <int N, bool mixed>
 TIEFMU_INLINE double solveMany(const TieView& tie, const double* offset, const SegmentList& list,
                                const SegmentLoads& loads, double* a, double* z) {
@@ -179,18 +190,17 @@ TIEFMU_INLINE double solveMany(const TieView& tie, const double* offset, const S
       w.xx += inertiaOfSlave;
       w.yy += inertiaOfSlave;
       w.zz += inertiaOfSlave;
-      for (int i = 0; i < N; ++i)
-        for (int j = i; j < N; ++j) {
-          const int ij = pairOf<N>(i, j);
-          const Simd4 share = phi[i] * phi[j];
-          c[ij] += share * md;
-          y[ij].xx += share * w.xx;
-          y[ij].xy += share * w.xy;
-          y[ij].xz += share * w.xz;
-          y[ij].yy += share * w.yy;
-          y[ij].yz += share * w.yz;
-          y[ij].zz += share * w.zz;
-        }
+      eachPair<N>([&](auto i, auto j) TIEFMU_INLINED {
+        constexpr int ij = pairOf<N>(i, j);
+        const Simd4 share = phi[i] * phi[j];
+        c[ij] += share * md;
+        y[ij].xx += share * w.xx;
+        y[ij].xy += share * w.xy;
+        y[ij].xz += share * w.xz;
+        y[ij].yy += share * w.yy;
+        y[ij].yz += share * w.yz;
+        y[ij].zz += share * w.zz;
+      });
     }
     const auto inverseOf = [&](int i, int j) TIEFMU_INLINED { return four.plane(manyPlane::inverse + 4 * i + j); };
     // The translations eliminated: S alpha = t - sum c x (A^-1 f).
@@ -200,20 +210,20 @@ TIEFMU_INLINE double solveMany(const TieView& tie, const double* offset, const S
       for (int j = 1; j < N; ++j) u[i] += inverseOf(i, j) * f[j];
     }
     Simd4 s[size][size], x[size];
-    for (int i = 0; i < N; ++i) {
+    each<0, N>([&](auto i) TIEFMU_INLINED {
       Simd4Vec3 e[N], right = t[i];  // e: (A^-1 c)_ri
-      for (int r = 0; r < N; ++r) {
+      each<0, N>([&](auto r) TIEFMU_INLINED {
         e[r] = inverseOf(r, 0) * c[pairOf<N>(0, i)];
-        for (int q = 1; q < N; ++q) e[r] += inverseOf(r, q) * c[pairOf<N>(q, i)];
+        each<1, N>([&](auto q) TIEFMU_INLINED { e[r] += inverseOf(r, q) * c[pairOf<N>(q, i)]; });
         right -= cross(c[pairOf<N>(i, r)], u[r]);
-      }
+      });
       x[3 * i] = right.x;
       x[3 * i + 1] = right.y;
       x[3 * i + 2] = right.z;
-      for (int j = i; j < N; ++j) {
+      each<decltype(i)::value, N>([&](auto j) TIEFMU_INLINED {
         const Symmetric& own = y[pairOf<N>(i, j)];
         Simd4 trace = {}, m[3][3] = {};  // sum c_rj e_ri^T
-        for (int r = 0; r < N; ++r) {
+        each<0, N>([&](auto r) TIEFMU_INLINED {
           const Simd4Vec3& cr = c[pairOf<N>(r, j)];
           trace += dot(e[r], cr);
           m[0][0] += cr.x * e[r].x;
@@ -225,7 +235,7 @@ TIEFMU_INLINE double solveMany(const TieView& tie, const double* offset, const S
           m[2][0] += cr.z * e[r].x;
           m[2][1] += cr.z * e[r].y;
           m[2][2] += cr.z * e[r].z;
-        }
+        });
         const Simd4 add = i == j ? four.plane(manyPlane::inertia + i) - trace : -trace;
         const int at = 3 * i, to = 3 * j;
         // Block i, j of S goes below the diagonal transposed.
@@ -238,18 +248,18 @@ TIEFMU_INLINE double solveMany(const TieView& tie, const double* offset, const S
         s[to][at + 2] = own.xz + m[2][0];
         s[to + 1][at + 2] = own.yz + m[2][1];
         s[to + 2][at + 2] = own.zz + m[2][2] + add;
-      }
-    }
+      });
+    });
     // L D L^T in place, x along with it.
     Simd4 inversePivot[size];
-    for (int k = 0; k < size; ++k) {
+    each<0, size>([&](auto k) TIEFMU_INLINED {
       inversePivot[k] = 1.0 / s[k][k];
-      for (int i = k + 1; i < size; ++i) {
+      each<decltype(k)::value + 1, size>([&](auto i) TIEFMU_INLINED {
         const Simd4 l = s[i][k] * inversePivot[k];
-        for (int j = k + 1; j <= i; ++j) s[i][j] -= l * s[j][k];
+        each<decltype(k)::value + 1, decltype(i)::value + 1>([&](auto j) TIEFMU_INLINED { s[i][j] -= l * s[j][k]; });
         x[i] -= l * x[k];
-      }
-    }
+      });
+    });
     for (int k = size; k-- > 0;) {
       Simd4 sum = x[k];
       for (int i = k + 1; i < size; ++i) sum -= s[i][k] * x[i];
@@ -257,10 +267,10 @@ TIEFMU_INLINE double solveMany(const TieView& tie, const double* offset, const S
     }
     Simd4Vec3 turn[N], g[N];
     for (int i = 0; i < N; ++i) turn[i] = {x[3 * i], x[3 * i + 1], x[3 * i + 2]};
-    for (int i = 0; i < N; ++i) {
+    each<0, N>([&](auto i) TIEFMU_INLINED {
       g[i] = cross(turn[0], c[pairOf<N>(i, 0)]);
-      for (int j = 1; j < N; ++j) g[i] += cross(turn[j], c[pairOf<N>(i, j)]);
-    }
+      each<1, N>([&](auto j) TIEFMU_INLINED { g[i] += cross(turn[j], c[pairOf<N>(i, j)]); });
+    });
     for (int i = 0; i < N; ++i) {
       Simd4Vec3 ai = u[i];
       for (int j = 0; j < N; ++j) ai -= inverseOf(i, j) * g[j];
