@@ -188,7 +188,8 @@ def write_page(
                     "'loads' is always stable, and as wrong as its lumping. 'full' ends at r = 1 whatever the step. "
                     "'split' survives every ratio as the step goes to zero; at finite steps the held load lags behind "
                     "the host's springs, which feeds energy in, and the host's damping has to outweigh it: "
-                    "H omega < 2 zeta (1 + r)/(r (r + 1/2)). Linear extrapolation moves that limit far up. What stays "
+                    "H omega < 2 zeta (1 + r)/(r (r + 1/2)). Linear extrapolation and leads, also the one inside "
+                    "the FMU, move that limit far up. What stays "
                     "at any ratio is 'full' closed by the tie's derivatives and extrapolated, and an FMU that owns the "
                     "masters.",
                 ],
