@@ -231,6 +231,7 @@ def test_wrong_inputs(weld, scene_file, capsys, tmp_path, case):
     [
         (["run", "no.fmu"], "no.fmu: no such file"),
         (["info", "no.fmu"], "no.fmu: no such file"),
+        (["advise", "text.fmu"], "text.fmu: is an FMU; give the scene that it was built from"),
         (["info", "text.fmu"], "text.fmu: not an FMU (a zip archive)"),
         (["run", "text.fmu"], "text.fmu: not an FMU that FMPy can read: File is not a zip file"),
         (["info", "foreign.fmu"], "foreign.fmu: holds no resources/report.json, so it was not made by tiefmu"),

@@ -15,6 +15,8 @@ import pytest
 import tiefmu
 from PIL import Image
 from tiefmu.cli import main
+from tiefmu.view import page
+from tiefmu.view.geometry import Geometry
 
 
 def without_scripts(text: str) -> str:
@@ -101,6 +103,31 @@ def test_the_page_in_the_fmu_has_the_same_tables(poor):
     for caption in re.findall(r"<caption>(.{20})", outside):
         assert cells(inside, caption) == cells(outside, caption)
     assert inside.index("<h2>Warnings") < inside.index("<h2>Dropped") < inside.index("<h2>Ties")
+
+
+def drawn(found: dict, monkeypatch):
+    """The figure of the page."""
+    import plotly.graph_objects as go
+
+    figures = []
+    monkeypatch.setattr(go.Figure, "to_html", lambda figure, **_: figures.append(figure) or "")
+    page.viewer(Geometry(found), found)
+    return figures[0]
+
+
+@pytest.mark.parametrize("far, titles", [(0.0, ["x [m]", "y [m]"]), (2e4, ["x -20000 [m]", "y +10000 [m]"])])
+def test_a_scene_far_from_the_origin_is_drawn_near_it(weld, monkeypatch, far, titles):
+    """Browsers draw in single precision: the picture's own numbers must keep a millimetre."""
+    shift = np.array([far, -far / 2, 0])
+    weld["mesh"]["nodes"] = [[row[0], *(np.array(row[1:]) + shift)] for row in weld["mesh"]["nodes"]]
+    figure = drawn(tiefmu.report(tiefmu.load(weld)), monkeypatch)
+    axes = figure.layout.scene
+    assert [axes.xaxis.title.text, axes.yaxis.title.text, axes.zaxis.title.text] == [*titles, "z [m]"]
+    slave = next(trace for trace in figure.data if trace.name == "slaves")
+    [place] = np.float32(np.column_stack([slave.x, slave.y, slave.z])).astype(float)
+    said = np.array([float(title.split()[1]) if " [" in title[1:] and title[2] != "[" else 0.0 for title in titles])
+    np.testing.assert_allclose(place[:2] - said, np.array([0.03, 0.06]) + shift[:2], rtol=0, atol=1e-5)
+    assert (slave.marker.cmin, slave.marker.cmax) == (0.0, pytest.approx(0.04))
 
 
 # -------------------------------------------------------------------------------------------------------------- browser

@@ -104,7 +104,7 @@ def parser() -> argparse.ArgumentParser:
         description="Prints the tie report of a scene, or the one that an FMU carries.",
         epilog="example: tiefmu info weld.toml --vtu ties.vtu",
     )
-    info.add_argument("model", metavar="SCENE-or-FMU", help="scene file (TOML) or FMU made by tiefmu")
+    info.add_argument("model", metavar="SCENE-or-FMU", help="scene (TOML), deck, or FMU made by tiefmu")
     info.add_argument("--json", action="store_true", help="the whole report as JSON")
     info.add_argument(
         "--vtu", metavar="VTU", type=Path, help="file to write the ties to, for ParaView: segments, slaves, projections"
@@ -121,7 +121,7 @@ def parser() -> argparse.ArgumentParser:
         "units; inputs without a column keep their start value, and are linear between the rows.",
         epilog="example: tiefmu run weld.fmu --input in.csv --output out.csv --plot out.png",
     )
-    run.add_argument("model", metavar="SCENE-or-FMU", help="scene file (TOML) or FMU")
+    run.add_argument("model", metavar="SCENE-or-FMU", help="scene (TOML), deck or FMU")
     run.add_argument("--stop-time", metavar="T", type=positive, help="end, s (default: of the input, or of the FMU)")
     run.add_argument(
         "--step", metavar="H", type=positive, help="communication step, s (default: the FMU's, but at least 500 steps)"

@@ -74,6 +74,8 @@ def plain(value):
 
 
 def read_toml(path: Path) -> dict:
+    if path.suffix.lower() == ".fmu" and path.is_file():
+        raise SceneError("is an FMU; give the scene that it was built from")
     try:
         return tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except FileNotFoundError:

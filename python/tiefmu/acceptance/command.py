@@ -24,7 +24,7 @@ def add_parser(commands) -> None:
         "status 0: passed, 1: failed, 2: bad input. Criteria: docs/acceptance.md.",
         epilog="example: tiefmu accept weld.fmu criteria.toml --input test17.csv --junit weld.xml --pictures out/weld",
     )
-    accept.add_argument("model", metavar="SCENE-or-FMU", help="scene file (TOML) or FMU")
+    accept.add_argument("model", metavar="SCENE-or-FMU", help="scene (TOML), deck or FMU")
     accept.add_argument(
         "criteria", metavar="CRITERIA", type=Path, nargs="?", help="criteria (TOML); default: those inside the FMU"
     )

@@ -29,7 +29,7 @@ def add_parser(commands) -> None:
         "that turns in the browser, worst distances, added masses, clamps, limits, variables. Opens without a network.",
         epilog="example: tiefmu report weld.toml -o weld.html",
     )
-    command.add_argument("model", metavar="SCENE-or-FMU", help="scene file (TOML) or FMU made by tiefmu")
+    command.add_argument("model", metavar="SCENE-or-FMU", help="scene (TOML), deck, or FMU made by tiefmu")
     command.add_argument(
         "-o", "--output", metavar="HTML", type=Path, help="file to write (default: name of the model + .html, here)"
     )
@@ -83,8 +83,10 @@ def viewer(geometry: Geometry, found: dict) -> str:
     import plotly.graph_objects as go
 
     rows = found["slaves"]
+    origin = near(geometry.positions)
+    nodes, slaves = geometry.positions - origin, geometry.slaves - origin
     order = sorted(range(len(rows)), key=lambda k: -rows[k]["distance"])[:DRAWN]
-    places, feet = geometry.slaves[order], geometry.feet[order]
+    places, feet = slaves[order], (geometry.feet - origin)[order]
     distances = [rows[k]["distance"] for k in order]
     words = [
         f"slave {row['id']}, tie {escape(row['tie'])}<br>segment {row['segment']}, xi {row['xi']:.4g}, eta "
@@ -99,23 +101,25 @@ def viewer(geometry: Geometry, found: dict) -> str:
     corner = np.array(corners, dtype=int).reshape(-1, 4)
     faces = np.vstack([corner[:, [0, 1, 2]], corner[:, [0, 2, 3]]])
     figure = go.Figure()
-    x, y, z = geometry.positions.T
+    x, y, z = nodes.T
     figure.add_trace(
         go.Mesh3d(
             x=x, y=y, z=z, i=faces[:, 0], j=faces[:, 1], k=faces[:, 2], color=SEGMENT, opacity=0.7, hoverinfo="skip",
             name="segments", flatshading=True, showlegend=True,
         )
     )  # fmt: skip
-    outline = geometry.positions[corner[:, [0, 1, 2, 3, 0]]]
+    outline = nodes[corner[:, [0, 1, 2, 3, 0]]]
     figure.add_trace(lines(outline, EDGE, 2, "edges"))
     figure.add_trace(lines(np.stack([feet, places], axis=1), "#bb4400", 2, "to the projection"))
-    figure.add_trace(points(geometry.positions, masters, "nodes", {"size": 3, "color": MASTER}))
+    figure.add_trace(points(nodes, masters, "nodes", {"size": 3, "color": MASTER}))
     bar = {"title": {"text": "distance [m]", "side": "right"}, "thickness": 14}
     look = {"size": 5, "color": distances, "colorscale": "Viridis", "colorbar": bar, "showscale": True}
+    if distances and distances[0] == distances[-1]:
+        look |= {"cmin": 0.0, "cmax": distances[0] or 1.0}
     shown = f"slaves (the {DRAWN} farthest of {len(rows)})" if len(rows) > DRAWN else "slaves"
     figure.add_trace(points(places, words, shown, look))
     worst = order[:LABELLED]
-    x, y, z = geometry.slaves[worst].T
+    x, y, z = slaves[worst].T
     figure.add_trace(
         go.Scatter3d(
             x=x, y=y, z=z, mode="text", text=[str(rows[k]["id"]) for k in worst], textposition="top center",
@@ -128,11 +132,22 @@ def viewer(geometry: Geometry, found: dict) -> str:
         scene={
             "aspectmode": "data",
             "camera": {"eye": {"x": 1.5, "y": 1.5, "z": 1.5}},
-            **{f"{axis}axis": {"title": {"text": f"{axis} [m]"}} for axis in "xyz"},
+            **{
+                f"{axis}axis": {"title": {"text": f"{axis} {f'{-o:+.9g} ' if o else ''}[m]"}}
+                for axis, o in zip("xyz", origin.tolist())
+            },
         },
         legend={"x": 0, "y": 1},
     )
     return figure.to_html(full_html=False, include_plotlyjs=True, div_id="picture", config={"displaylogo": False})
+
+
+def near(positions: np.ndarray) -> np.ndarray:
+    """Where the picture has its origin: browsers draw with seven digits. Zero unless the scene is far from it, (3,)."""
+    size, centre = float(np.ptp(positions, axis=0).max()), positions.mean(axis=0)
+    if not 0 < 1e3 * size < np.abs(centre).max():
+        return np.zeros(3)
+    return np.round(centre, int(np.floor(-np.log10(size))))
 
 
 def lines(polylines: np.ndarray, colour: str, width: float, name: str) -> Any:
