@@ -12,6 +12,7 @@ import struct
 import subprocess
 import sys
 import time
+import zlib
 from pathlib import Path
 
 from tiefmu.binaries import BUILT, CHECKOUT, is_stale, source_hash
@@ -39,7 +40,7 @@ def main(zig: Path, names: list[str]) -> int:
 
 
 def build(platform: Platform, zig: Path, compiler: Path) -> int:
-    began, made_from = time.perf_counter(), source_hash()
+    began, worked, made_from = time.perf_counter(), processor_time(), source_hash()
     libraries = []
     for target in platform.targets:
         folder = CHECKOUT / "build" / "zig" / target
@@ -57,8 +58,16 @@ def build(platform: Platform, zig: Path, compiler: Path) -> int:
     for file, source in (LICENSES | (WINDOWS_LICENSES if system == "windows" else {})).items():
         shutil.copyfile(zig / source, target / "licenses" / file)
     (target / "made-from").write_text(made_from + "\n")  # last: it says that all is there
-    print(f"{platform.kept}: {len(data) / 1e6:.2f} MB in {time.perf_counter() - began:.0f} s, in {target}", flush=True)
+    size = f"{len(data) / 1e6:.2f} MB, {len(zlib.compress(data, 9)) / 1e6:.2f} MB compressed"
+    spent = f"{time.perf_counter() - began:.0f} s, {processor_time() - worked:.0f} s of processor time"
+    print(f"{platform.kept}: {size}, in {spent}; in {target}", flush=True)
     return 0
+
+
+def processor_time() -> float:
+    """Of what this process has started and waited for."""
+    times = os.times()
+    return times.children_user + times.children_system
 
 
 def commands(target: str, folder: Path, compiler: Path) -> list[list]:

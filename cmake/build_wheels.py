@@ -29,6 +29,8 @@ BUILD = "import json, sys, scikit_build_core.build as b; b.build_wheel(sys.argv[
 
 
 def main(zig: Path, names: list[str]) -> int:
+    if not (zig / "zig").is_file():
+        return fail(f"{zig / 'zig'}: no such file; the package ziglang brings it")
     for platform in PLATFORMS:
         if is_stale(platform.folder):
             return fail(f"platform '{platform.folder}': {missing(platform.folder)}")

@@ -219,6 +219,17 @@ def test_platforms_that_there_is_no_library_for(weld, built, scene_file, capsys,
     assert not Path("weld.fmu").exists()
 
 
+def test_make_binaries_says_what_is_unknown_or_missing(tmp_path):
+    script = binaries.CHECKOUT / "cmake" / "build_binaries.py"
+    for platforms_asked, line in (
+        (["win64", "win65"], "error: platform 'win65' is unknown; known: linux64, win64, "),
+        (["win64"], f"error: {tmp_path / 'zig'}: no such file; the package ziglang brings it"),
+    ):
+        done = subprocess.run([sys.executable, script, tmp_path, *platforms_asked], capture_output=True, text=True)
+        assert (done.returncode, done.stdout) == (2, "")
+        assert done.stderr.startswith(line) and done.stderr.count("\n") == 1
+
+
 # ------------------------------------------------------------------------------------------------------------- running
 
 
