@@ -14,12 +14,9 @@ else()
 endif()
 set(CMAKE_CXX_COMPILER "${TIEFMU_ZIG}" c++ -target ${TIEFMU_TARGET})
 set(CMAKE_CXX_COMPILER_TARGET "")
-# One program with subcommands: CMake's rules for archives name it in full.
 set(CMAKE_AR "${TIEFMU_ZIG}")
 set(CMAKE_RANLIB "${TIEFMU_ZIG}")
-set(CMAKE_CXX_ARCHIVE_CREATE "\"${TIEFMU_ZIG}\" ar qc <TARGET> <OBJECTS>")
-set(CMAKE_CXX_ARCHIVE_APPEND "\"${TIEFMU_ZIG}\" ar q <TARGET> <OBJECTS>")
-set(CMAKE_CXX_ARCHIVE_FINISH "")
+set(CMAKE_USER_MAKE_RULES_OVERRIDE_CXX "${CMAKE_CURRENT_LIST_DIR}/zig_archive.cmake")
 set(CMAKE_CXX_FLAGS_INIT -g0)  # zig describes everything for debuggers otherwise
 set(CMAKE_SHARED_LINKER_FLAGS_INIT -s)
 set(CMAKE_MODULE_LINKER_FLAGS_INIT -s)
