@@ -412,7 +412,7 @@ def explain(error: dict) -> str:
     if kind in EXPECTED:
         return f"expected {EXPECTED[kind]}, found {found(value)}"
     if kind == "greater_than_equal":
-        return f"{found(value)} is too small; it must be at least {context['ge']}"
+        return f"{found(value)} is too small; it must be at least {context['ge']:g}"
     if kind == "greater_than":
         return f"{found(value)} is too small; it must be more than {context['gt']:g}"
     if kind == "less_than_equal":
