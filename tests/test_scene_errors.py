@@ -463,6 +463,19 @@ def test_not_text(tmp_path, scene_file, capsys):
     assert capsys.readouterr().err == "error: weld.toml: not a text file (byte 9 is not UTF-8)\n"
 
 
+@pytest.mark.parametrize(
+    "words", [["build"], ["advise"], ["study", "speed-accuracy"], ["study", "coupling"]], ids=" ".join
+)
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_an_fmu_where_a_scene_is_asked_for(weld, tmp_path, monkeypatch, capsys, words, fmi):
+    monkeypatch.chdir(tmp_path)
+    tiefmu.build(tiefmu.load(weld), tmp_path / "weld.fmu", fmi=fmi)
+    assert main([*words, "weld.fmu"]) == 2
+    assert capsys.readouterr().err == (
+        "error: weld.fmu: an FMU, where a scene is asked for; only info, run, accept, report and sweep take FMUs\n"
+    )
+
+
 def test_first_error_only(weld, scene_file, capsys):
     weld["node"][0]["mass"] = -1
     weld["tie"][0]["slaves"] = [999]

@@ -220,11 +220,37 @@ def test_columns_of_several_types(tmp_path):
     assert [json.loads(text) for text in found["mixed"] + found["k"]] == ["a", 1, [1, 2, 3], 4.0]
 
 
-def test_an_fmu_in_place_of_a_scene(folder):
-    tiefmu.build(tiefmu.load("plate.toml"), folder / "plate.fmu")
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_an_fmu_in_place_of_a_scene(folder, fmi):
+    tiefmu.build(tiefmu.load("plate.toml"), folder / "plate.fmu", fmi=fmi)
     text = SWEEP.replace("plate.toml", "plate.fmu").replace('scene = "node[2].mass"', 'start = "master[1].f_ext[3]"')
     found = in_this_process(text)
     assert len({row["peak"] for row in found}) == 12
+
+
+def test_fmus_of_both_standards_give_the_same_table(folder):
+    """By the command line. Of FMI 3.0 a start value is an element of an array, and others of it keep theirs."""
+    text = SWEEP.replace('scene = "node[2].mass"', 'start = "master[1].f_ext[3]"')
+    for fmi in (2, 3):
+        tiefmu.build(tiefmu.load("plate.toml"), folder / f"{fmi}.fmu", fmi=fmi)
+        Path("sweep.toml").write_text(text.replace("plate.toml", f"{fmi}.fmu"))
+        assert main(["sweep", "sweep.toml", "-o", f"{fmi}.parquet", "--workers", "1"]) == 0
+    tables = [pyarrow.parquet.read_table(f"{fmi}.parquet") for fmi in (2, 3)]
+    assert tables[0].equals(tables[1])
+    assert tables[0].num_rows == 12 and len(set(tables[0]["peak"].to_pylist())) == 12
+
+
+def test_what_a_sweep_asks_of_an_fmu_of_arrays(folder, capsys):
+    tiefmu.build(tiefmu.load("plate.toml"), folder / "plate.fmu", fmi=3)
+    text = SWEEP.replace("plate.toml", "plate.fmu").replace('scene = "node[2].mass"', 'start = "master.f_ext"')
+    Path("sweep.toml").write_text(text)
+    assert main(["sweep", "sweep.toml", "-o", "out.parquet"]) == 2
+    said = capsys.readouterr().err
+    assert said.startswith("error: sweep.toml: start 'master.f_ext': no input or parameter of the FMU; did you mean")
+    assert "'master[" in said and said.count("\n") == 1
+    Path("sweep.toml").write_text(SWEEP.replace("plate.toml", "plate.fmu"))
+    assert main(["sweep", "sweep.toml", "-o", "out.parquet"]) == 2
+    assert "an FMU has no scene" in capsys.readouterr().err
 
 
 # ------------------------------------------------------------------------------------------------ going on, and death

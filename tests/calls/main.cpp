@@ -1,12 +1,12 @@
 // Tests of the FMU's functions that need a sanitizer, random calls by the hundred thousand, or failing memory.
 //
-//   tiefmu_calls states|failures|threads FOLDER...
-//   tiefmu_calls leaks COUNT FOLDER...
-//   tiefmu_calls sequences COUNT FIRST FOLDER...      COUNT 1: repeats one sequence aloud
+//   tiefmu_calls states|failures|threads FMI FOLDER...
+//   tiefmu_calls leaks FMI COUNT FOLDER...
+//   tiefmu_calls sequences FMI COUNT FIRST FOLDER...  COUNT 1: repeats one sequence aloud
 //   tiefmu_calls resources FILE...                    what the fuzzers start from, and what they found once
 //   tiefmu_calls serialised SCENE FILE...
 //
-// FOLDER: of a packed scene's scene.bin. Exit status 1 and one line on stderr: a defect.
+// FMI: 2 or 3. FOLDER: of a packed scene's scene.bin. Exit status 1 and one line on stderr: a defect.
 #include <cstdlib>
 #include <fstream>
 #include <iterator>
@@ -45,10 +45,15 @@ int main(int count, char** words) {
     }
     return 0;
   }
+  const std::string version = next();
+  require(version == "2" || version == "3", "no FMI '" + version + "'");
+  const Standard& standard = version == "2" ? fmi2 : fmi3;
   const long amount = test == "sequences" || test == "leaks" ? number() : 0;
   const long first = test == "sequences" ? number() : 0;
   require(!arguments.empty(), "no folder");
-  const std::vector<Packed> packed(arguments.begin(), arguments.end());
+  std::vector<Packed> packed;
+  packed.reserve(arguments.size());
+  for (const std::string& folder : arguments) packed.emplace_back(folder, standard);
   if (test == "sequences")
     testSequences(packed, amount, first);
   else if (test == "threads")

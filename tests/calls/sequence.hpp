@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <memory>
 
 #include "tests.hpp"
 
@@ -31,7 +32,7 @@ class Random {
   std::uint64_t state;
 };
 
-using Call = std::function<fmi2Status(Session&)>;
+using Call = std::function<int(Session&)>;
 
 // A call, and whether it has to be refused; if not it may still end in an error: a step can diverge.
 struct Attempt {
@@ -43,20 +44,78 @@ struct Count { long good = 0, refused = 0, errors = 0; };
 
 class Sequence {
  public:
-  Sequence(const Packed& packed, const Packed& other, std::uint64_t seed, std::map<std::string, Count>& counts)
+  // Of the packed scenes' standard.
+  static std::unique_ptr<Sequence> of(const Packed& packed, const Packed& other, std::uint64_t seed,
+                                      std::map<std::string, Count>& counts);
+  virtual ~Sequence() = default;
+  void run();
+
+  std::string prefix;  // of messages: which sequence
+  bool aloud = false;  // prints every call
+
+ protected:
+  Sequence(const Packed& packed, const Packed& other, std::uint64_t seed, std::map<std::string, Count>& counts,
+           bool asks)
       : packed_(packed),
         other_(other),
         random_(seed),
-        tested_(packed, random_.once(2)),
-        twin_(packed),
-        counts_(counts) {}
+        tested_(packed, random_.once(2), asks),
+        twin_(packed, false, asks),
+        counts_(counts) {
+    tested_.intrudes = asks;
+  }
 
-  void run();
-
- private:
   static constexpr double infinity = std::numeric_limits<double>::infinity();
   static constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
+  // What a caller does next on its way to the first step.
+  virtual const char* onTheWay(State state) = 0;
+  virtual Attempt make(const Row& r, bool spoil) = 0;
+
+  // Arguments
+  References some(const References& from);
+  std::uint32_t unknown();
+  Values near(const References& references);
+  double notFinite();
+  // The start of a run and its end.
+  struct Times {
+    double start, stop;
+    bool defined;
+  };
+  Times times(bool spoil);
+  // A point in time and the size of a step, and whether they have to be refused.
+  struct Step {
+    double point, size;
+    bool refused;
+  };
+  Step nextStep(bool spoil);
+  std::vector<std::string> categories(bool spoil);
+  // Index of an entry; mostly of one that holds something, unless it is to be written.
+  template <class T> std::size_t filled(const std::vector<T>& list, bool written) {
+    std::size_t at = random_.below(list.size());
+    for (std::size_t tries = written ? 0 : 4; tries > 0 && list[at] == T{}; --tries) at = random_.below(list.size());
+    return at;
+  }
+  // Calls on states, which both standards have: what each of them is called.
+  struct StateCalls {
+    const char *get, *set, *free, *size, *serialize, *deserialize;
+    int (*getInto)(Session&, void** state);
+    int (*setTo)(Session&, void* state);
+    int (*freeAt)(Session&, void** state);
+    int (*sizeOf)(Session&, void* state, std::size_t* size);
+    int (*toBytes)(Session&, void* state, char* bytes, std::size_t size);
+    int (*fromBytes)(Session&, const char* bytes, std::size_t size, void** state);
+  };
+  Attempt onStates(const StateCalls& calls, const std::string& name, bool spoil);
+
+  const Packed &packed_, &other_;
+  Random random_;
+  Session tested_, twin_;
+  State state_ = instantiated;
+  double time_ = 0, stop_ = infinity;
+  std::function<void()> after_;  // what a success changes
+
+ private:
   struct Kept {
     State state;
     double time, stop;
@@ -66,49 +125,18 @@ class Sequence {
   static std::string rerun(Session& session);
   void step(const Row& r);
   // The state after a call that was not to be refused.
-  void follow(const Row& r, fmi2Status status);
+  void follow(const Row& r, int status);
   void trace(const Row& r, const Attempt& attempt, State before);
-
-  // Arguments
-  References some(const References& from);
-  References any();
-  fmi2ValueReference unknown();
-  Values near(const References& references);
-  double notFinite();
-  Attempt make(const Row& r);
-  Attempt setDebugLogging(bool spoil);
-  Attempt setupExperiment(bool spoil);
-  Attempt getReal(bool spoil);
-  Attempt setReal(bool spoil);
-  Attempt doStep(bool spoil);
-  // Index of an entry; mostly of one that holds something, unless it is to be written.
-  template <class T> std::size_t filled(const std::vector<T>& list, bool written) {
-    std::size_t at = random_.below(list.size());
-    for (std::size_t tries = written ? 0 : 4; tries > 0 && list[at] == T{}; --tries) at = random_.below(list.size());
-    return at;
-  }
-  Attempt onStates(const std::string& name, bool spoil);
-  Attempt deSerialize(std::size_t slot, std::size_t list, bool spoil);
+  Attempt deserialize(const StateCalls& calls, std::size_t slot, std::size_t list, bool spoil);
   // A state of another scene.
-  std::vector<fmi2Byte> foreign();
-  Attempt directional(bool spoil);
-  Attempt inputDerivatives(bool spoil);
-  Attempt outputDerivatives(bool spoil);
-  Attempt statusOf(const std::string& name, bool spoil);
-  Attempt otherTypes(const std::string& name, bool spoil);
+  std::vector<char> foreign();
 
- public:
-  std::string prefix;  // of messages: which sequence
-  bool aloud = false;  // prints every call
-
- private:
-  const Packed &packed_, &other_;
-  Random random_;
-  Session tested_, twin_;
   std::map<std::string, Count>& counts_;
-  State state_ = instantiated;
-  double time_ = 0, stop_ = infinity;
   Kept kept_[3]{}, keptBytes_[2]{};
-  std::function<void()> after_;  // what a success changes
   std::string where_;
 };
+
+std::unique_ptr<Sequence> sequenceOfFmi2(const Packed& packed, const Packed& other, std::uint64_t seed,
+                                         std::map<std::string, Count>& counts);
+std::unique_ptr<Sequence> sequenceOfFmi3(const Packed& packed, const Packed& other, std::uint64_t seed,
+                                         std::map<std::string, Count>& counts);

@@ -7,9 +7,9 @@ namespace {
 std::string life(const Packed& packed) {
   std::string bytes;
   for (int i = 0; i < 3; ++i) {
-    Session session(packed, true);
+    Session session(packed, true, true);
     bytes += future(session, instantiated);
-    for (const Row& r : standard) {
+    for (const Row& r : packed.standard.rows) {
       r.call(session);
       bytes += session.result;
     }
