@@ -46,20 +46,21 @@ class CallbackLog final : public Log {
 // Where the importer wants to be asked, a step is done substep by substep: after each but the last it may set inputs,
 // get outputs, and have the step end earlier. True if it did.
 bool step(Fmi3Instance& own, double point, double size) {
+  constexpr double mostSubsteps = 1e9;
   Instance& i = own.instance;
-  if (!own.intermediateUpdate || !(size > 0)) {
-    i.doStep(point, size);
-    return false;
-  }
+  i.beginStep(point, size);  // a step that is refused has not begun
   double end = point + size, left = size, at = point;
   bool returnsEarly = false;
   for (;;) {
-    const double count = std::ceil(left / i.largestSubstep() * (1 - 1e-12));
-    if (!(count > 1)) {
-      i.doStep(at, left);
-      return returnsEarly;
+    const double count = own.intermediateUpdate ? std::ceil(left / i.largestSubstep() * (1 - 1e-12)) : 1;
+    const bool last = !(count > 1 && count <= mostSubsteps);
+    try {
+      i.doStep(at, last ? left : left / count);
+    } catch (const Refused& e) {
+      if (at == point) throw;
+      throw std::runtime_error(e.what());
     }
-    i.doStep(at, left / count);
+    if (last) return returnsEarly;
     fmi3Boolean early = fmi3False;
     fmi3Float64 until = i.time();
     i.state = State::inStep;

@@ -200,7 +200,7 @@ void Instance::set(const std::vector<Span>& spans, const double values[]) {
   copyRuns(changed);
 }
 
-void Instance::doStep(double point, double step) {
+void Instance::beginStep(double point, double step) {
   if (!(step > 0) || !std::isfinite(step) || std::isinf(point + step))
     throw Refused("the step size " + text(step) + " s is not above zero and finite");
   const double allowed = tolerance(clock.time, step);
@@ -211,6 +211,10 @@ void Instance::doStep(double point, double step) {
   if (point + step == point)
     throw Refused("the step size " + text(step) + " s is too small to move the time on from " + text(point) + " s");
   if (step > host.step) warnOfStep(step);
+}
+
+void Instance::doStep(double point, double step) {
+  beginStep(point, step);
   try {
     simulation.step(step);
   } catch (const StepTooLong& e) {

@@ -51,6 +51,8 @@ class Instance {
   void get(const std::vector<Span>& spans, double values[]);
   void set(const std::vector<Span>& spans, const double values[]);
   void doStep(double currentCommunicationPoint, double communicationStepSize);
+  // What it checks before anything changes; for a step that is done in parts.
+  void beginStep(double currentCommunicationPoint, double communicationStepSize);
   double largestSubstep() const { return simulation.largestSubstep(); }
   const Model& model() const { return simulation.model(); }
   std::vector<Block> blocks() const { return variables(simulation.model(), simulation.layout()); }

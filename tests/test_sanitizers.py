@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import tiefmu
+from fmi3_calls import functions
 from fmu_calls import MODEL_EXCHANGE
 from fmu_scenes import ALL_FREE, DRIVEN, MIXED, SETTINGS, scene
 from port_scenes import ported
@@ -20,7 +21,23 @@ from port_scenes import ported
 pytestmark = pytest.mark.sanitizers
 ROOT = Path(__file__).resolve().parents[1]
 SEQUENCES = int(os.environ.get("TIEFMU_SEQUENCES", 2000))
-NEVER_ALLOWED = {"fmi2" + name for name in ["CancelStep", *MODEL_EXCHANGE]}
+# Of FMI 3.0: what this FMU has none of, and what is an empty call for that reason.
+ABSENT = (
+    "ConfigurationMode Interval Shift DiscreteStates EventMode StepMode ContinuousTime Integrator SetTime Partition"
+)
+TYPES = "Float32 Int8 UInt8 Int16 UInt16 Int32 UInt32 UInt64 Boolean Binary Clock".split()
+EMPTY = {f"fmi3{access}{kind}" for access in ("Get", "Set") for kind in TYPES} | {"fmi3SetInt64", "fmi3SetString"}
+NEVER_ALLOWED = {
+    2: {"fmi2" + name for name in ["CancelStep", *MODEL_EXCHANGE]},
+    3: {
+        name
+        for name in functions()
+        if any(word in name for word in [*ABSENT.split(), "ContinuousState", "EventIndicators"])
+    },
+}
+NEVER_REFUSED = {2: {"fmi2Reset"}, 3: {"fmi3Reset", "fmi3GetNumberOfVariableDependencies"} | EMPTY - {"fmi3SetInt32"}}
+FUNCTIONS = {2: 40, 3: len(functions()) - 5}  # but those that make an instance or free it, and the version
+SHARE = {2: 2, 3: 8}  # of the sequences, so that both take about as long
 
 
 def program(preset: str) -> Path:
@@ -75,20 +92,25 @@ def test_addresses_and_undefined_behaviour(folders, tmp_path):
     corpus = ROOT / "tests" / "fuzz" / "corpus"
     run(calls, "resources", *sorted((corpus / "resource").iterdir()))
     run(calls, "serialised", corpus.parent / "scene.bin", *sorted((corpus / "state").iterdir()))
-    run(calls, "states", *folders)
-    run(calls, "failures", *folders)
-    run(calls, "leaks", 1000, *folders)
+    for fmi in (2, 3):
+        run(calls, "states", fmi, *folders)
+        run(calls, "failures", fmi, *(folders if fmi == 2 else folders[2:]))
+        run(calls, "leaks", fmi, 500, *folders)
     scenes = [
         packed(tmp_path / str(number), scene(np.random.default_rng(1), *settings))
         for number, settings in enumerate(SETTINGS)
     ] + [folders[-1]]
-    table = list(csv.DictReader(run(calls, "sequences", SEQUENCES, 1, *scenes).splitlines()))
-    assert len(table) == 40
-    for row in table:  # sequences that get nowhere would prove nothing
-        assert (int(row["good"]) > 0) == (row["function"] not in NEVER_ALLOWED), row
-        assert (int(row["refused"]) > 0) == (row["function"] != "fmi2Reset"), row
-    print(f"{SEQUENCES} sequences", *(",".join(row.values()) for row in table), sep="\n")
+    for fmi in (2, 3):
+        table = list(csv.DictReader(run(calls, "sequences", fmi, SEQUENCES // SHARE[fmi], 1, *scenes).splitlines()))
+        assert len(table) == FUNCTIONS[fmi]
+        for row in table:  # sequences that get nowhere would prove nothing
+            name = row["function"]
+            assert (int(row["good"]) > 0) == (name not in NEVER_ALLOWED[fmi]), row
+            assert (int(row["refused"]) > 0) == (name not in NEVER_REFUSED[fmi]), row
+        print(f"{SEQUENCES // SHARE[fmi]} sequences by FMI {fmi}", *(",".join(row.values()) for row in table), sep="\n")
 
 
 def test_two_instances_in_two_threads(folders):
-    run(program("threads"), "threads", *folders)
+    calls = program("threads")
+    for fmi in (2, 3):
+        run(calls, "threads", fmi, *folders)

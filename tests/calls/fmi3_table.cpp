@@ -35,9 +35,8 @@ void update(fmi3InstanceEnvironment environment, fmi3Float64 time, fmi3Boolean, 
 }
 
 void instantiate(Session& s, const char* token, bool logging) {
-  const std::string path = s.packed.folder + "/";
-  s.component = fmi3InstantiateCoSimulation("session", token, path.c_str(), fmi3False, logging, fmi3False, s.asks,
-                                            nullptr, 0, &s, keep, s.asks ? update : nullptr);
+  s.component = fmi3InstantiateCoSimulation("session", token, s.packed.path.c_str(), fmi3False, logging, fmi3False,
+                                            s.asks, nullptr, 0, &s, keep, s.asks ? update : nullptr);
 }
 
 int step(Session& s, double time, double size) {
@@ -121,7 +120,7 @@ int getOutputDerivatives(Session& s) {
   return status;
 }
 // Long enough for an importer to be asked, where one wants that.
-int doStep(Session& s) { return step(s, 0, s.asks ? 2 : 0.01); }
+int doStep(Session& s) { return step(s, 0, s.asks ? 1.3 : 0.01); }
 
 // What no variable has: only an empty call is right.
 template <auto function> int empty(Session& s) { return function(s.component, nullptr, 0, nullptr, 0); }

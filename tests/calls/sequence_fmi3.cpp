@@ -226,10 +226,11 @@ Attempt SequenceOfFmi3::dependencies(bool spoil) {
   if (spoil) switch (random_.below(3)) {
       case 0: reference = unknown(); break;
       case 1: wrongCount = true; break;
-      default:
-        reference = packed_.outputs[0];  // which has some
-        null = static_cast<int>(random_.below(4));
+      default: null = static_cast<int>(random_.below(4));
     }
+  std::size_t some = 0;  // null pointers are right where there are none
+  fmi3GetNumberOfVariableDependencies(tested_.component, reference, &some);
+  const bool refused = spoil && (null < 0 || some > 0);
   return {[=](Session& s) {
             std::size_t count = 0;
             fmi3GetNumberOfVariableDependencies(s.component, reference, &count);
@@ -243,7 +244,7 @@ Attempt SequenceOfFmi3::dependencies(bool spoil) {
             if (status == fmi3OK) s.give(variables.data(), count * sizeof(std::uint32_t));
             return status;
           },
-          spoil};
+          refused};
 }
 
 Attempt SequenceOfFmi3::derivative(bool adjoint, bool spoil) {

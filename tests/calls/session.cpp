@@ -33,7 +33,7 @@ Values inputs(const Packed& packed, int step) {
   return values;
 }
 
-Packed::Packed(std::string where, const Standard& by) : folder(std::move(where)), standard(by) {
+Packed::Packed(std::string where, const Standard& by) : folder(std::move(where)), path(folder + "/"), standard(by) {
   std::ifstream stream(folder + "/scene.bin", std::ios::binary);
   const std::string data{std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
   const tiefmu::Resource resource = tiefmu::readResource(data);

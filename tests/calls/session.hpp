@@ -22,6 +22,7 @@ struct Packed {
   Packed(std::string folder, const Standard& standard);  // of scene.bin
 
   std::string folder, guid;
+  std::string path;  // the folder as FMI 3.0 names it
   const Standard& standard;
   // Value references: scalars of FMI 2.0, arrays of FMI 3.0.
   References inputs, outputs, parameters, calculated;
