@@ -6,7 +6,7 @@
 # make format  what of that a program can mend
 # make tools  install other people's tools that the tests run FMUs in
 # make study  measure speed, accuracy and stability, write charts and tables to docs/study/
-# make sanitize  the FMU's functions under sanitizers, 100,000 random sequences of calls (CI: SEQUENCES=2000)
+# make sanitize  the FMU's functions under sanitizers, 62,500 random sequences of calls by both standards (CI: SEQUENCES=2000)
 # make projections  1,000,000 random quads against a search in extended precision (make test: 20,000)
 # make fuzz   60 s of fuzzing of resources, serialised states and scene files
 # make binaries  build the FMU's library for Linux (glibc 2.17 or later) and Windows, for every FMU built afterwards;

@@ -254,6 +254,27 @@ def test_a_step_may_end_early(free):
     instance.free()
 
 
+def test_a_step_in_parts_that_must_be_refused_has_not_begun(free):
+    asked = []
+    instance = Instance(free, update=lambda *_: asked.append(1))
+    assert instance.initialise(stop=1e-3) == OK
+    assert instance.call("ExitInitializationMode") == OK
+    step = 4 * instance.get("stable_time_step")[0]
+    before = instance.get("time", *free.names("output"))
+    for size in (step, 1e300):
+        assert instance.step(0.0, size)[0] == ERROR
+        assert "after the stop time" in instance.errors()[-1]
+    assert not asked
+    np.testing.assert_array_equal(instance.get("time", *free.names("output")), before)
+    assert instance.step(0.0, 1e-3)[0] == OK
+    instance.free()
+    endless = Instance(free, update=lambda *_: asked.append(1)).start()
+    assert endless.step(0.0, 1e15)[0] == ERROR
+    assert "substeps" in endless.errors()[-1] and not asked
+    assert endless.step(0.0, 1e-3)[0] == OK
+    endless.free()
+
+
 # ------------------------------------------------------------------------------------ what is refused
 
 

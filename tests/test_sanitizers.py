@@ -25,7 +25,7 @@ SEQUENCES = int(os.environ.get("TIEFMU_SEQUENCES", 2000))
 ABSENT = (
     "ConfigurationMode Interval Shift DiscreteStates EventMode StepMode ContinuousTime Integrator SetTime Partition"
 )
-TYPES = "Float32 Int8 UInt8 Int16 UInt16 Int32 UInt32 UInt64 Boolean Binary Clock".split()
+TYPES = ["Float32", "Int8", "UInt8", "Int16", "UInt16", "Int32", "UInt32", "UInt64", "Boolean", "Binary", "Clock"]
 EMPTY = {f"fmi3{access}{kind}" for access in ("Get", "Set") for kind in TYPES} | {"fmi3SetInt64", "fmi3SetString"}
 NEVER_ALLOWED = {
     2: {"fmi2" + name for name in ["CancelStep", *MODEL_EXCHANGE]},

@@ -29,8 +29,8 @@ def fmus(folder) -> dict[str, str]:
 class Slave:
     """By FMPy, arrays by name."""
 
-    def __init__(self, path: str):
-        description = fmpy.read_model_description(path)
+    def __init__(self, path: str, validate=True):
+        description = fmpy.read_model_description(path, validate=validate)
         self.array = {v.name: v for v in description.modelVariables}
         self.fmu = FMU3Slave(
             instanceName="slave",
@@ -65,7 +65,8 @@ def test_the_checks_of_the_toolbox(fmus, folder, scene):
 
 
 def test_a_container_of_the_toolbox(fmus, folder):
-    """Arrays connected to arrays: host and tie as one FMU of FMI 3.0."""
+    """Arrays connected to arrays: host and tie as one FMU of FMI 3.0, whose own description breaks the schema where an
+    input is an array."""
     pair = {
         "name": "pair.fmu",
         "step_size": STEP,
@@ -78,12 +79,14 @@ def test_a_container_of_the_toolbox(fmus, folder):
     words = ["-container", "pair.json", "-fmu-directory", folder, "-fmi", 3]
     quiet = ["-no-auto-link", "-no-auto-input", "-no-auto-output"]
     call(program("importers", "fmucontainer"), *words, *quiet, cwd=folder)
-    container, host, tie = (Slave(str(folder / name)) for name in ("pair.fmu", "host.fmu", "tie.fmu"))
+    container = Slave(str(folder / "pair.fmu"), validate=False)
+    host, tie = (Slave(fmus[name]) for name in ("host", "tie"))
 
     def exchange():
         v, f = host.get("master.v"), tie.get("master.f")
         tie.set("master.v", v), host.set("master.f_ext", f)
 
+    exchange()  # values pass at initialisation too
     for slave in (container, host, tie):
         slave.fmu.exitInitializationMode()
     found, expected = [], []

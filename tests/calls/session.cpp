@@ -78,8 +78,11 @@ void Packed::add(References& list, std::size_t size, const double* values) {
 Values Packed::startOf(const References& of) const {
   Values values;
   for (std::uint32_t r : of)
-    values.insert(values.end(), start_.begin() + static_cast<std::ptrdiff_t>(first_[r]),
-                  start_.begin() + static_cast<std::ptrdiff_t>(first_[r + 1]));
+    if (r < references())
+      values.insert(values.end(), start_.begin() + static_cast<std::ptrdiff_t>(first_[r]),
+                    start_.begin() + static_cast<std::ptrdiff_t>(first_[r + 1]));
+    else
+      values.push_back(0);
   return values;
 }
 

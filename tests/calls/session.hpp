@@ -34,7 +34,7 @@ struct Packed {
   };
   std::vector<Other> others;
   std::size_t references() const { return first_.size() - 1; }
-  Values startOf(const References& references) const;  // of known ones, one after another
+  Values startOf(const References& references) const;  // one after another; of unknown ones a zero
 
  private:
   void add(References& list, std::size_t size, const double* values);
