@@ -51,12 +51,19 @@ def panel(kind: str, rotations: bool, **model) -> dict:
     }
 
 
+def led(made: dict) -> dict:
+    made["model"]["reaction_lead"] = 0.5
+    return made
+
+
 SMALL = {
     **{name_of(case): (lambda case=case: scene(np.random.default_rng(11), *case)) for case in SETTINGS + PLACES},
     **{
         f"ports-{name_of(case)}": (lambda case=case: ported(np.random.default_rng(3), case, motions="mixed"))
         for case in PORTS
     },
+    "lead": lambda: led(scene(np.random.default_rng(11), *MIXED)),
+    "lead-places": lambda: led(scene(np.random.default_rng(11), *PLACES[0])),
     "ports-line": lambda: line_of_slaves(True, at=[0.0, 0.4, 0.3]),
 }
 PANELS = {
