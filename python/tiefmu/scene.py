@@ -6,7 +6,6 @@ over all nodes of the mesh, in SI. Search and mechanics are checked by the solve
 
 import re
 import sys
-import zipfile
 from enum import Enum
 from pathlib import Path
 
@@ -84,10 +83,6 @@ def read_toml(path: Path) -> dict:
     except OSError as error:
         raise SceneError(error.strerror) from None
     except UnicodeDecodeError as error:
-        if zipfile.is_zipfile(path):
-            raise SceneError(
-                "an FMU, where a scene is asked for; only info, run, accept, report and sweep take FMUs"
-            ) from None
         raise SceneError(f"not a text file (byte {error.start} is not UTF-8)") from None
     except (tomllib.TOMLDecodeError, RecursionError) as error:
         place = re.fullmatch(r"(.*) \(at (?:line (\d+), column (\d+)|end of document)\)", str(error), re.DOTALL)
