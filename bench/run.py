@@ -27,6 +27,8 @@ CONSISTENT = [f"{name}-consistent" for name in FORMULATIONS]
 WELDS = [f"{name}-{kind}" for kind in ("welds1", "welds4") for name in FORMULATIONS]
 # Surfaces whose loads change sign before every step; slaves of a quad a node's mass (light), or four times that.
 FLIPPED = [f"{name}-{kind}" for kind in ("light-flipped", "flipped") for name in FORMULATIONS]
+# One slave in steps of a hundred substeps: what a substep costs without what stands round a step.
+LONG = [f"{name}-long" for name in FORMULATIONS]
 SLAVES = [1, 4, 16, 100, 1_000, 10_000, 100_000, 1_000_000]
 THREADS = [1, 2]
 COUNTED = 1024  # slaves of the instruction counts: in the caches, and the rest of the program small beside them
@@ -68,6 +70,8 @@ def cycles(bench: Path, slaves: list[int]) -> list[list[str]]:
         for case in FORMULATIONS + CONSISTENT:
             for threads in THREADS if n >= 100 else [1]:
                 rows += run(bench, "kernels", case, n, threads)
+        for case in LONG if n == 1 else []:
+            rows += run(bench, "kernels", case, n, 1)
         if n >= 10_000:
             for case in FORMULATIONS:
                 rows += run(bench, "kernels", case, n, "shuffled", 1)
