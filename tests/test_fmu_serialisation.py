@@ -172,7 +172,7 @@ def checksum(body: bytes) -> int:
     return value
 
 
-def packed(body: bytes, version=3) -> bytes:
+def packed(body: bytes, version=4) -> bytes:
     return MAGIC + struct.pack("<IQQ", version, len(body), checksum(body)) + body
 
 
@@ -223,8 +223,8 @@ def test_any_byte_altered(whole):
 
 def test_older_and_newer_versions(whole):
     instance, data = whole
-    for version in (0, 1, 2, 77):
-        assert f"format version {version}, this FMU reads version 3" in refusal(
+    for version in (0, 1, 2, 3, 77):
+        assert f"format version {version}, this FMU reads version 4" in refusal(
             instance, packed(data[HEADER:], version)
         )
 
