@@ -87,10 +87,10 @@ def read_table(
     return CsvTable(names, values, unit)
 
 
-def text_lines(path: Path) -> list[str]:
+def text_lines(path: str | Path) -> list[str]:
     """Of UTF-8, of UTF-16 with its mark, or of the Western code page of Windows. Raises RunError."""
     try:
-        data = path.read_bytes()
+        data = Path(path).read_bytes()
     except FileNotFoundError:
         raise RunError(f"{path}: no such file") from None
     except OSError as error:
