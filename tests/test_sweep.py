@@ -296,6 +296,7 @@ def test_ctrl_c_says_how_to_go_on(folder):
         stderr=subprocess.PIPE,
         text=True,
         start_new_session=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # ignored in a job in the background
     )
     try:
         wait_for(lambda: journal_rows() > 10 or sweep.poll() is not None)
