@@ -236,6 +236,7 @@ def test_wrong_inputs(weld, scene_file, capsys, tmp_path, case):
         (["run", "text.fmu"], "text.fmu: not an FMU that FMPy can read: File is not a zip file"),
         (["info", "foreign.fmu"], "foreign.fmu: holds no resources/report.json, so it was not made by tiefmu"),
         (["info", "list.fmu"], "list.fmu: its resources/report.json is none of tiefmu"),
+        (["info", "cut.fmu"], "cut.fmu: its resources/report.json is damaged"),
         (["info", "damaged.fmu"], "damaged.fmu: not an FMU (a zip archive)"),
         (["run", "damaged.fmu"], "damaged.fmu: cannot be unpacked: Bad CRC-32 for file 'resources/report.json'"),
         (["run", "weld.toml", "--output", "no/out.csv"], "no/out.csv: folder no does not exist"),
@@ -265,6 +266,8 @@ def test_wrong_files(weld, scene_file, capsys, tmp_path, arguments, line):
         )
     with zipfile.ZipFile(tmp_path / "list.fmu", "w") as archive:
         archive.writestr("resources/report.json", "[]")
+    with zipfile.ZipFile(tmp_path / "cut.fmu", "w") as archive:
+        archive.writestr("resources/report.json", '{"slaves": [')
     xml = package.contents(tiefmu.load(weld))["modelDescription.xml"]
     with zipfile.ZipFile(tmp_path / "damaged.fmu", "w") as archive:
         archive.writestr("modelDescription.xml", xml)
@@ -388,3 +391,15 @@ def test_demo_fails_where_a_check_fails(free, tmp_path, capsys, monkeypatch):
     monkeypatch.setattr(demo, "check", lambda result: [demo.Check("finite values", False)])
     assert main(["demo", "--scenes", str(tmp_path), "--out", str(tmp_path / "out")]) == 1
     assert "A CHECK FAILED" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("version", [2, 3])
+def test_many_variables_are_warned_of_where_they_are_scalars(weld, scene_file, monkeypatch, capsys, version):
+    monkeypatch.setattr(sys.modules["tiefmu.report"], "MANY_VARIABLES", 10)
+    scene_file(weld)
+    assert main(["build", "weld.toml", "--fmi", str(version)]) == 0
+    error = capsys.readouterr().err
+    assert ("many importers and masters take minutes" in error, "'tiefmu build --fmi 3' makes arrays" in error) == (
+        version == 2,
+        version == 2,
+    )

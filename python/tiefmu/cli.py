@@ -59,8 +59,8 @@ def fail(message: str) -> int:
 def parser() -> argparse.ArgumentParser:
     top = Parser(
         prog="tiefmu",
-        description="Puts the tied interface of an explicit crash code into an FMI 2.0 co-simulation "
-        "FMU. A scene is a TOML file; see scenes/ for examples.",
+        description="Puts the tied interface of an explicit crash code into an FMI 2.0 or 3.0 "
+        "co-simulation FMU. A scene is a TOML file; see scenes/ for examples.",
     )
     top.add_argument("--version", action="version", version=f"tiefmu {__version__}")
     commands = top.add_subparsers(required=True, metavar="COMMAND")
@@ -168,7 +168,7 @@ def run_build(options: argparse.Namespace) -> None:
     scene = load(options.scene)
     criteria = accept_command.packed(options.criteria) if options.criteria else {}
     fmu = build(scene, options.output or Path(f"{scene.name}.fmu"), criteria, options.platforms, options.fmi)
-    found = report(scene)
+    found = report(scene, arrays=options.fmi == 3)
     show_warnings(options.scene, found)
     if not options.platforms and stale():
         print(

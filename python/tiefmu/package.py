@@ -64,7 +64,7 @@ def contents(scene: Scene, platforms: list[str] | None = None, fmi: int = 2) -> 
 
 
 def from_report(scene: Scene, description: _core.Description, fmi: int) -> dict[str, bytes]:
-    found = report(scene)
+    found = report(scene, arrays=fmi == 3)
     if fmi == 3:
         xml = io.BytesIO()
         description.write(fmi, "", xml.write)

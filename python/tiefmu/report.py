@@ -18,14 +18,15 @@ MANY_VARIABLES = 10_000  # importers read them in seconds, masters connect them 
 SHOWN = 20  # slaves, masters, points and ids that the text shows; the dict has all
 
 
-def report(scene: Scene, positions: bool = False) -> dict:
+def report(scene: Scene, positions: bool = False, arrays: bool = False) -> dict:
     """What became of the scene: ties, slaves, masters, points, limits, findings; plain lists and numbers, SI units.
 
     Keys are those of the JSON. Per slave: xi, eta of the projection and its distance; d = |offset|, to the
     projection (default) or the segment's barycentre (optimized); `weights` as the tie uses them (Phi, or 1/n);
     `added`: lumped mass and inertia on each master (theory 4). A step that nothing limits is 1e30; an infinite `cond`
     or `lambda` is null. `position`: of masters and points at the start, where they are at most MOST_PLACES, or
-    if asked for by `positions`. `interface`: the variables, a row a kind.
+    if asked for by `positions`. `interface`: the variables, a row a kind. `arrays`: of an FMI 3.0 FMU, where their
+    number is no matter.
     `lumping`: {"ratio", "segment", "connected"}: how far lumped inertia is from the true one (src/lumping.hpp; ratio
     null: infinite); null where no master is free, lumping is exact, or inertia is consistent.
     """
@@ -46,7 +47,7 @@ def report(scene: Scene, positions: bool = False) -> dict:
             {"id": number, "tie": scene.ties[tie].name, "reason": reason} for number, tie, reason in found["dropped"]
         ],
         "left_out": found["left_out"].tolist(),
-        "warnings": scene.warnings + found["warnings"] + size_warning(sum(variables.values())),
+        "warnings": scene.warnings + found["warnings"] + size_warning(0 if arrays else sum(variables.values())),
         "notes": [*scene.notes, *found["notes"]],
         "stable_time_step": scene.start.get("stable_time_step").tolist()[0],
         "nodal_time_step": scene.start.get("nodal_time_step").tolist()[0],
@@ -249,7 +250,8 @@ def size_warning(variables: int) -> list[str]:
         return []
     return [
         f"interface: {variables} variables; many importers and masters take minutes over more than {MANY_VARIABLES}; "
-        "'ports' in [interface] makes the nodes of a set one rigid port of 12 variables"
+        "'ports' in [interface] makes the nodes of a set one rigid port of 12 variables, and 'tiefmu build --fmi 3' "
+        "makes arrays of them"
     ]
 
 
@@ -262,6 +264,8 @@ def of_fmu(path: Path) -> dict:
         raise UsageError(f"{path}: holds no resources/report.json, so it was not made by tiefmu") from None
     except OSError as error:
         raise UsageError(f"{path}: {error.strerror}") from None
+    except ValueError:
+        raise UsageError(f"{path}: its resources/report.json is damaged") from None
     except Exception:  # damaged archives raise many kinds
         raise UsageError(f"{path}: not an FMU (a zip archive)") from None
     if not isinstance(found, dict) or "slaves" not in found:
