@@ -1,6 +1,6 @@
 // Derivatives of the outputs by the inputs: the way from inputs to outputs in loads.cpp, dynamics.cpp and outputs.cpp,
 // linearised into a chain of maps. Directional derivatives run through it forward, adjoint ones backward by the
-// transposes: J dx and J^T dy, each at about the price of one evaluation.
+// transposes: J dx and J^T dy, each in one pass.
 #pragma once
 
 #include <functional>

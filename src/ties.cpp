@@ -106,10 +106,7 @@ void Ties::distributeLoads(const double* force, const double* moment, double* f,
       tiefmu::distributeLoads(group, {first, last}, geometry(g), force, moment, f, t);
     };
     const std::vector<int>& end = group.partEnd;
-    if (end.size() == 1)
-      part(0, end[0]);
-    else
-      eachInPhases(group, [&](int k) { part(k == 0 ? 0 : end[k - 1], end[k]); });
+    eachInPhases(group, [&](int k) { part(k == 0 ? 0 : end[k - 1], end[k]); });
   }
 }
 

@@ -108,6 +108,7 @@ template <class Body> void Ties::eachPart(Body body) const {
 }
 
 template <class Body> void Ties::eachInPhases(const TieGroup& group, const Body& body) const {
+  if (group.partEnd.size() == 1) return body(0);
   int first = 0;
   for (int last : group.phaseEnd) {
     each(last - first, [&](int k) { body(first + k); });

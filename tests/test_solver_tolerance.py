@@ -5,6 +5,7 @@ import pytest
 from fmu_calls import OK, Fmu, Instance
 from in_process import Run
 from independent import Problem, constant
+from random_scenes import structure
 from test_fmu_serialisation import restored, run, serialised
 from test_inertia_islands import accelerations
 from test_threads import panel
@@ -54,6 +55,22 @@ def test_error_of_the_accelerations(tolerance, heavy, formulation, rotations):
     relative = np.sqrt(error @ mass @ error / (exact @ mass @ exact))
     assert relative < 5 * tolerance
     assert tolerance < 1e-9 or relative > 1e-3 * tolerance  # it is what ends the iteration
+
+
+@forms
+@pytest.mark.parametrize("light", [1.0, 1e-3, 1e-6])
+def test_small_surfaces_are_solved_to_rounding(light, formulation, rotations):
+    """Whatever the tolerance, and however much of the inertia is the slaves': the norm is that of the test above."""
+    scene = structure(np.random.default_rng(11), formulation, rotations, slaves=12)
+    scene["model"]["solver_tolerance"] = 1e-2
+    scene["node"][0]["mass"] *= light
+    scene["node"][0]["inertia"] *= light
+    problem = Problem(scene)
+    now = problem.evaluate(0.0, problem.start())
+    error = (accelerations(Run(scene), problem) - now["a"]).ravel()[problem.free]
+    exact = now["a"].ravel()[problem.free]
+    mass = problem.mass_matrix(now["T"])[np.ix_(problem.free, problem.free)]
+    assert np.sqrt(error @ mass @ error / (exact @ mass @ exact)) < 1e-12
 
 
 @forms
