@@ -12,7 +12,8 @@ from conftest import toml
 from independent import Problem
 from scipy.integrate import solve_ivp
 from tiefmu.study import coupling, coupling_reference, coupling_runs
-from tiefmu.study.hosts import Coupling, InProcess, Packaged
+from tiefmu.study.hosts import Coupling
+from tiefmu.study.ties import InProcess, Packaged
 
 SCENES = Path(__file__).parents[1] / "scenes"
 ORDERS = {"held": 1, "linear": 2, "quadratic": 3}
@@ -99,12 +100,12 @@ def test_heavy_slave(heavy):
 
 
 def test_study_repeats_and_writes_everything(spotweld, tmp_path):
-    """Two runs differ only in the time column; a page, an SVG and a PNG stand beside the CSV."""
-    again = study(tmp_path, SCENES / "spotweld.toml", "--decades", 2.5)
-    for a, b in zip(spotweld, again, strict=True):
-        for key in coupling.TIMES:
-            del a[key], b[key]
-        assert repr(a) == repr(b)
+    """Two runs differ only in the time column, here at the steps of the shorter one; a page, an SVG and a PNG stand
+    beside the CSV."""
+    again = study(tmp_path, SCENES / "spotweld.toml", "--decades", 1)
+    first = [row for row in spotweld if row["steps"] in coupling.ladder(1)]
+    for a, b in zip(first, again, strict=True):
+        assert {key for key in a if repr(a[key]) != repr(b[key])} <= set(coupling.TIMES)
     assert {path.name for path in tmp_path.iterdir()} == {
         "coupling.html",
         *(f"coupling_spotweld.{kind}" for kind in ("csv", "png", "svg")),

@@ -1,91 +1,26 @@
-"""`tiefmu sweep`: cases, rows against single runs, any number of workers, workers that die, going on."""
+"""`tiefmu sweep`: cases, rows against single runs, any number of workers, wrong sweeps."""
 
 import json
 import os
-import signal
-import subprocess
-import sys
-import time
 from pathlib import Path
 from typing import get_args
 
 import numpy as np
 import pyarrow.parquet
 import pytest
+import sweep_files
 import tiefmu
+from sweep_files import SCENE, SWEEP, in_this_process, rows
 from tiefmu.cli import main
 from tiefmu.run import run
-from tiefmu.sweep import command, design, table, worker
-
-SCENE = """
-[mesh]
-nodes = [[1, 0, 0, 0], [2, 0.1, 0, 0], [3, 0.1, 0.1, 0], [4, 0, 0.1, 0], [9, 0.03, 0.06, 0.04]]
-segments = [[1, 1, 2, 3, 4]]
-[[node]]
-nodes = "all"
-motion = "free"
-rotations = true
-mass = 1.0
-inertia = 1.0e-3
-[[node]]
-nodes = [9]
-mass = 0.3
-[[tie]]
-name = "weld"
-segments = "all"
-slaves = [9]
-[[spring]]
-ground = [1, 2, 3, 4]
-kind = "bushing"
-stiffness = 1.0e5
-rotational_stiffness = 1.0e6
-"""
-CRITERIA = """
-[[limit]]
-name = "peak"
-signal = "slave[1].v"
-at_most = 0.05
-[[limit]]
-name = "force"
-signal = "master[*].f"
-combine = "sum"
-at_most = 1e9
-"""
-SWEEP = """
-scene = "plate.toml"
-criteria = "criteria.toml"
-signals = ["slave[1].v[3]"]
-[run]
-input = "in.csv"
-step = 1e-4
-[[parameter]]
-name = "mass"
-scene = "node[2].mass"
-values = [0.1, 0.3]
-[[parameter]]
-start = "integrator.safety"
-from = 0.5
-to = 0.9
-count = 2
-[[parameter]]
-name = "load"
-input = "slave[1].f[3]"
-values = [0.5, 1.0, 2.0]
-"""
+from tiefmu.sweep import design, table
 
 
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    Path("plate.toml").write_text(SCENE)
-    Path("criteria.toml").write_text(CRITERIA)
-    Path("sweep.toml").write_text(SWEEP)
-    Path("in.csv").write_text("time,slave[1].f[3]\n0,0\n0.005,100\n0.01,0\n")
+    sweep_files.write()
     return tmp_path
-
-
-def rows(path="out.parquet"):
-    return pyarrow.parquet.read_table(path).to_pylist()
 
 
 # --------------------------------------------------------------------------------------------------------------- cases
@@ -126,8 +61,8 @@ def test_rows_are_single_runs_for_any_number_of_workers(folder, capsys):
         "criteria.toml", "in.csv", "out.parquet", "plate.toml", "sweep.toml",
     ]  # fmt: skip
     two = rows()
-    assert main(["sweep", "sweep.toml", "-o", "one.parquet", "--workers", "1"]) == 0
-    assert Path("one.parquet").read_bytes() == Path("out.parquet").read_bytes()
+    for row, alone in zip(two, in_this_process(SWEEP), strict=True):
+        assert {key: row[key] for key in alone} == alone
     assert [row["case"] for row in two] == list(range(12))
     for row in (two[1], two[10]):  # built, loaded and run by hand
         scene = SCENE.replace("mass = 0.3", f"mass = {row['mass']}") + (
@@ -145,22 +80,6 @@ def test_rows_are_single_runs_for_any_number_of_workers(folder, capsys):
         assert row["message"] == ""
     assert len({row["peak"] for row in two}) == 12
     assert {row["passed"] for row in two} == {True, False}
-
-
-def in_this_process(text) -> list[dict]:
-    """The rows without dask, batch after batch."""
-    Path("sweep.toml").write_text(text)
-    sweep = design.read(Path("sweep.toml"))
-    todo = design.cases(sweep, "sweep.toml")
-    task = command.shared(sweep, Path(), "sweep.toml")
-    raw, files = command.scene_of(sweep, Path())
-    found = {}
-    for batch in command.batched(sweep, todo):
-        data = raw
-        if isinstance(raw, dict):
-            data = worker.build_variant(design.variant(raw, sweep, batch[0].values), files)
-        found |= dict(worker.run_batch(data, task, [(case.number, case.values) for case in batch]))
-    return [found[case.number] for case in todo]
 
 
 def test_a_case_that_diverges_is_a_row_with_its_message(folder):
@@ -220,24 +139,17 @@ def test_columns_of_several_types(tmp_path):
     assert [json.loads(text) for text in found["mixed"] + found["k"]] == ["a", 1, [1, 2, 3], 4.0]
 
 
-@pytest.mark.parametrize("fmi", [2, 3])
-def test_an_fmu_in_place_of_a_scene(folder, fmi):
-    tiefmu.build(tiefmu.load("plate.toml"), folder / "plate.fmu", fmi=fmi)
-    text = SWEEP.replace("plate.toml", "plate.fmu").replace('scene = "node[2].mass"', 'start = "master[1].f_ext[3]"')
-    found = in_this_process(text)
-    assert len({row["peak"] for row in found}) == 12
-
-
-def test_fmus_of_both_standards_give_the_same_table(folder):
-    """By the command line. Of FMI 3.0 a start value is an element of an array, and others of it keep theirs."""
+def test_fmus_of_both_standards_in_place_of_a_scene(folder):
+    """FMI 3.0 by the command line. There a start value is an element of an array, and others of it keep theirs."""
     text = SWEEP.replace('scene = "node[2].mass"', 'start = "master[1].f_ext[3]"')
     for fmi in (2, 3):
         tiefmu.build(tiefmu.load("plate.toml"), folder / f"{fmi}.fmu", fmi=fmi)
-        Path("sweep.toml").write_text(text.replace("plate.toml", f"{fmi}.fmu"))
-        assert main(["sweep", "sweep.toml", "-o", f"{fmi}.parquet", "--workers", "1"]) == 0
-    tables = [pyarrow.parquet.read_table(f"{fmi}.parquet") for fmi in (2, 3)]
-    assert tables[0].equals(tables[1])
-    assert tables[0].num_rows == 12 and len(set(tables[0]["peak"].to_pylist())) == 12
+    expected = in_this_process(text.replace("plate.toml", "2.fmu"))
+    Path("sweep.toml").write_text(text.replace("plate.toml", "3.fmu"))
+    assert main(["sweep", "sweep.toml", "-o", "out.parquet", "--workers", "1"]) == 0
+    for row, other in zip(rows(), expected, strict=True):
+        assert {key: row[key] for key in other} == other
+    assert len({row["peak"] for row in expected}) == 12
 
 
 def test_what_a_sweep_asks_of_an_fmu_of_arrays(folder, capsys):
@@ -251,139 +163,6 @@ def test_what_a_sweep_asks_of_an_fmu_of_arrays(folder, capsys):
     Path("sweep.toml").write_text(SWEEP.replace("plate.toml", "plate.fmu"))
     assert main(["sweep", "sweep.toml", "-o", "out.parquet"]) == 2
     assert "an FMU has no scene" in capsys.readouterr().err
-
-
-# ------------------------------------------------------------------------------------------------ going on, and death
-
-
-def test_going_on_after_an_interruption(folder, monkeypatch, capsys):
-    assert main(["sweep", "sweep.toml", "-o", "whole.parquet", "--workers", "1"]) == 0
-    add = command.Journal.add
-
-    def interrupted(journal, found):
-        add(journal, found)
-        if len(journal.rows) >= 5:
-            raise KeyboardInterrupt
-
-    monkeypatch.setattr(command.Journal, "add", interrupted)
-    assert main(["sweep", "sweep.toml", "-o", "out.parquet", "--workers", "1"]) == 130
-    journal = Path(".out.parquet.journal")
-    done = len(journal.read_text().splitlines()) - 1
-    assert 5 <= done < 12 and not Path("out.parquet").exists()
-    journal.write_text(journal.read_text() + '[11, {"pe')  # cut in the middle of a line
-    seen = []
-
-    def counted(journal, found):
-        seen.extend(found)
-        add(journal, found)
-
-    monkeypatch.setattr(command.Journal, "add", counted)
-    assert main(["sweep", "sweep.toml", "-o", "out.parquet", "--workers", "1", "--resume"]) == 0
-    assert len(seen) == 12 - done
-    assert Path("out.parquet").read_bytes() == Path("whole.parquet").read_bytes()
-    assert not journal.exists()
-    journal.write_text(json.dumps({"sweep": "another"}) + "\n")
-    assert main(["sweep", "sweep.toml", "-o", "out.parquet", "--resume"]) == 2
-    assert "is of another sweep" in capsys.readouterr().err
-
-
-def test_ctrl_c_says_how_to_go_on(folder):
-    """As a terminal does it: to all processes of the sweep. One line, no traceback of a worker."""
-    Path("sweep.toml").write_text(SWEEP.replace("[0.5, 1.0, 2.0]", str([0.1 * k for k in range(1, 601)])))
-    sweep = subprocess.Popen(
-        [sys.executable, "-m", "tiefmu.cli", "sweep", "sweep.toml", "-o", "out.parquet", "--workers", "1"],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        start_new_session=True,
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # ignored in a job in the background
-    )
-    try:
-        wait_for(lambda: journal_rows() > 10 or sweep.poll() is not None)
-        os.killpg(sweep.pid, signal.SIGINT)
-        out, error = sweep.communicate(timeout=120)
-    finally:
-        if sweep.poll() is None:
-            os.killpg(sweep.pid, signal.SIGKILL)
-    assert (sweep.returncode, out) == (130, "")
-    done = journal_rows()
-    assert error == f"out.parquet: interrupted, {done} of 2400 cases are finished; --resume goes on with the others\n"
-
-
-def test_finished_cases_are_not_thrown_away(folder, capsys):
-    """Without --resume, with a damaged journal."""
-    journal = Path(".out.parquet.journal")
-    journal.write_text('{"sweep": "x"}\n[0, {"peak": 1.0, "message": ""}]\n')
-    before = journal.read_bytes()
-    assert main(["sweep", "sweep.toml", "-o", "out.parquet"]) == 2
-    assert capsys.readouterr().err == (
-        "error: .out.parquet.journal: holds 1 finished cases of an interrupted sweep; --resume goes on with them, "
-        "without this file it starts anew\n"
-    )
-    for damaged in (b"\xff\n", b"[]\n", b"7\n", b'["x", {}]\n', b'[1, "x"]\n'):
-        sweep = design.read(Path("sweep.toml"))
-        raw, files = command.scene_of(sweep, Path())
-        todo = design.cases(sweep, "sweep.toml")
-        key = command.digest(command.shared(sweep, Path(), "sweep.toml"), raw, files, todo)
-        journal.write_bytes(json.dumps({"sweep": key}).encode() + b"\n" + damaged)
-        assert main(["sweep", "sweep.toml", "-o", "out.parquet", "--resume"]) == 2
-        assert capsys.readouterr().err == (
-            "error: .out.parquet.journal: line 2: is damaged; remove it to lose but its case\n"
-        )
-        assert journal.read_bytes().endswith(damaged)
-    journal.write_bytes(before)
-    assert main(["sweep", "sweep.toml", "-o", "out.parquet", "--resume"]) == 2
-    assert "is of another sweep" in capsys.readouterr().err
-    assert journal.read_bytes() == before
-
-
-def test_a_worker_that_is_killed_in_mid_sweep(folder):
-    """Scheduler and workers are processes of their own; one worker dies at its first rows."""
-    Path("sweep.toml").write_text(SWEEP.replace("[0.5, 1.0, 2.0]", str([0.1 * k for k in range(1, 61)])))
-    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
-    dask = [sys.executable, "-m", "distributed.cli.dask_scheduler"]
-    processes = [
-        subprocess.Popen([*dask, "--port", "0", "--no-dashboard", "--scheduler-file", "scheduler.json"], **quiet)
-    ]
-    try:
-        wait_for(lambda: Path("scheduler.json").exists() and Path("scheduler.json").read_text().endswith("}"))
-        address = json.loads(Path("scheduler.json").read_text())["address"]
-        start = [sys.executable, "-m", "distributed.cli.dask_worker", address, "--nthreads", "1", "--no-dashboard"]
-        workers = [subprocess.Popen([*start, "--no-nanny"], **quiet) for _ in range(2)]
-        processes += workers
-        sweep = subprocess.Popen(
-            [sys.executable, "-m", "tiefmu.cli", "sweep", "sweep.toml", "-o", "out.parquet", "--scheduler", address],
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-        )
-        processes.append(sweep)
-        wait_for(lambda: journal_rows() > 10)
-        workers[0].send_signal(signal.SIGKILL)
-        assert journal_rows() < 240 and sweep.poll() is None
-        out, error = sweep.communicate(timeout=120)
-        assert sweep.returncode == 0, error
-        assert "240 cases" in out
-    finally:
-        for process in processes:
-            process.kill()
-            process.wait()
-    found = rows()
-    assert not any(row["message"] for row in found)
-    for row, expected in zip(found, in_this_process(Path("sweep.toml").read_text())):
-        assert {key: row[key] for key in expected} == expected
-
-
-def journal_rows() -> int:
-    path = Path(".out.parquet.journal")
-    return len(path.read_text().splitlines()) - 1 if path.exists() else 0
-
-
-def wait_for(holds, seconds=120.0) -> None:
-    end = time.monotonic() + seconds
-    while not holds():
-        assert time.monotonic() < end
-        time.sleep(0.05)
 
 
 def test_the_page_names_every_key():

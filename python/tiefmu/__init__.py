@@ -1,4 +1,4 @@
-"""Tied interfaces between meshes as FMI 2.0 co-simulation units.
+"""Tied interfaces between meshes as FMI 2.0 and 3.0 co-simulation units.
 
 scene = tiefmu.load("weld.toml")     # or a dict of the same shape; raises SceneError
 tiefmu.report(scene)                 # what became of it, as a dict

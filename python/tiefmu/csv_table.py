@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from .errors import RunError
+from .errors import RunError, one_line
 
 DELIMITERS = (",", ";", "\t")
 PREAMBLE = 100  # lines at most that may stand above the header
@@ -25,10 +25,6 @@ class CsvTable:
     names: list[str]
     values: np.ndarray
     unit: str
-
-
-def one_line(error) -> str:
-    return " ".join(str(error).split())
 
 
 def read_table(

@@ -2,7 +2,7 @@
 
 from ._core import Diverged, SceneError, StepTooLong
 
-__all__ = ["Diverged", "RunError", "RunStopped", "SceneError", "StepTooLong", "UsageError"]
+__all__ = ["Diverged", "RunError", "RunStopped", "SceneError", "StepTooLong", "UsageError", "one_line"]
 
 
 class UsageError(ValueError):
@@ -14,4 +14,8 @@ class RunError(Exception):
 
 
 class RunStopped(RunError):
-    """The FMU refused to go on."""
+    """The FMU refused to go on, or gave no numbers."""
+
+
+def one_line(error) -> str:
+    return " ".join(str(error).split())

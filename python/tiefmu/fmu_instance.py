@@ -12,8 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from .csv_table import one_line
-from .errors import RunError, RunStopped
+from .errors import RunError, RunStopped, one_line
 from .fmi3_variables import elements
 from .fmi_access import Access2, Access3, moving_pointer
 from .platforms import LibraryError, here, library_of
@@ -175,8 +174,7 @@ class Instance:
     ) -> Iterator[np.ndarray]:
         """Runs it. Yields rows of time and outputs (rows, 1 + outputs), at the start and after each step, in blocks of
         at most `largest` bytes. finished(time) after each step. Row k holds what the FMU answers at the end of step k,
-        the inputs being those of the start of the step. Raises RunError, RunStopped of a
-        step."""
+        the inputs being those of the start of the step. Raises RunError, RunStopped of a step."""
         inputs, time = plan.inputs, plan.start
         points = plan.points(self.fmu.description.coSimulation.canHandleVariableCommunicationStepSize)
         estimate = int(min(plan.rows, 1e15)) + 3

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from .._core import SceneError
+from ..errors import one_line
 from ..schema import shortened, suggestion
 from .data import Block, MeshFile, find
 
@@ -31,7 +32,7 @@ def load_npz(path: Path) -> dict[str, np.ndarray]:
             with np.load(opened, allow_pickle=False) as file:
                 return {key: file[key] for key in file.files}
         except Exception as error:
-            raise SceneError(f"cannot be read as npz ({' '.join(str(error).split())})") from None
+            raise SceneError(f"cannot be read as npz ({one_line(error)})") from None
 
 
 def read(path: Path) -> MeshFile:

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from .._core import SceneError
+from ..errors import one_line
 from .data import Block, MeshFile
 from .meshio_reader import needed
 
@@ -46,7 +47,7 @@ def read(path: Path) -> MeshFile:
     except (OSError, RuntimeError, KeyError, ValueError, IndexError, AttributeError, TypeError) as error:
         if isinstance(error, SceneError):
             raise
-        raise SceneError(f"cannot be read as MED ({' '.join(str(error).split())})") from None
+        raise SceneError(f"cannot be read as MED ({one_line(error)})") from None
 
 
 def converted(data) -> MeshFile:

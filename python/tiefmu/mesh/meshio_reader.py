@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from .._core import SceneError
+from ..errors import one_line
 from .data import Block, MeshFile
 
 GLOBAL_IDS = re.compile(r"(?i)global_?(node|point|element|cell)?_?ids?")
@@ -42,7 +43,7 @@ def read(path: Path) -> MeshFile:
     except (ValueError, TypeError, IndexError, AttributeError) as error:
         if isinstance(error, SceneError):
             raise
-        raise SceneError(f"meshio cannot read it: {' '.join(str(error).split())}") from None
+        raise SceneError(f"meshio cannot read it: {one_line(error)}") from None
 
 
 def needed(error: ImportError) -> SceneError:

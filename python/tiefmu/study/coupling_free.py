@@ -21,9 +21,14 @@ def scene(study: "Study") -> Scene:
     table = {node.nodes[0]: node for node in tables.node}
     for k, node in enumerate(study.node_ids):
         table[node].motion, table[node].mass = "free", float(study.own[3 * k])
-    for k, i in enumerate(study.names.turning):
-        table[study.node_ids[study.names.driven.index(i)]].inertia = float(study.own[study.translations + 3 * k])
+    for k, node in enumerate(turning_ids(study)):
+        table[node].inertia = float(study.own[study.translations + 3 * k])
     return study.source.compile(tables)
+
+
+def turning_ids(study: "Study") -> list[int]:
+    """Masters that turn."""
+    return [study.node_ids[study.names.driven.index(number)] for number in study.names.turning]
 
 
 class Owner:
@@ -33,10 +38,8 @@ class Owner:
         self.study, self.host = study, study.masses("full", 0 * study.own)
         nodes = free.model.report()["nodes"]
         place = {int(i): k for k, i in enumerate(nodes["id"])}
-        self.rows, self.turning = (
-            [place[i] for i in study.node_ids],
-            [place[study.node_ids[study.names.driven.index(i)]] for i in study.names.turning],
-        )
+        self.rows = [place[i] for i in study.node_ids]
+        self.turning = [place[i] for i in turning_ids(study)]
         n = study.translations
         springs = np.zeros((2, len(nodes["id"]), 3))
         springs[:, self.rows] = np.reshape([self.host.stiffness[:n], self.host.damping[:n]], (2, -1, 3))
@@ -53,11 +56,8 @@ class Owner:
         study, masters, simulation = self.study, self.masters, self.masters.simulation
         masters.restart()
         state, before, used = masters.rest(), np.zeros(len(study.own)), np.zeros(study.translations)
-        velocity, load, residual = (
-            np.empty((count, len(study.direction))),
-            np.empty((count, len(study.own))),
-            np.zeros(count),
-        )
+        velocity, load = np.empty((count, len(study.direction))), np.empty((count, len(study.own)))
+        residual = np.zeros(count)
         bound = 1e6 * study.amplitude_velocity()
         start = time.process_time()
         for n in range(count):

@@ -11,8 +11,9 @@ from .._core import Diverged, SceneError
 from ..scene import Scene
 from . import coupling_free
 from .coupling_reference import Reference, relative
-from .hosts import EXTRAPOLATIONS, Coupling, InProcess, Masses, Packaged
+from .hosts import EXTRAPOLATIONS, Coupling, Masses
 from .limits import GROWS
+from .ties import InProcess, Packaged
 from .variants import Source, change
 
 OMEGA = 1000.0  # rad/s, of each of the host's masters on its ground spring, or of the exchanged spring; at least
@@ -193,11 +194,8 @@ class Study:
     def row(
         self, tie: Packaged, linear: InProcess, reference: "Reference", way: Way, extrapolation: str, count: int
     ) -> Row:
-        size, host, order = (
-            self.window / count,
-            self.masses(way.reaction, tie.added),
-            EXTRAPOLATIONS.index(extrapolation),
-        )
+        size, host = self.window / count, self.masses(way.reaction, tie.added)
+        order = EXTRAPOLATIONS.index(extrapolation)
         probe = Coupling(linear, host, size, order, closed=way.closed)
         radius = self.rate(probe)
         run = self.simulate(tie, host, size, order, count, way.closed)

@@ -8,7 +8,8 @@ import numpy as np
 from .. import _core
 from ..loading import load
 from ..scene import Scene
-from .hosts import Coupling, FreeMasters, InProcess, Masses
+from .hosts import Coupling, FreeMasters, Masses
+from .ties import InProcess
 
 GROWS = 1 + 1e-7  # growth a step that counts: above the rounding of an eigenvalue, below what 2 % off a limit makes
 

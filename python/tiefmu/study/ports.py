@@ -74,7 +74,7 @@ def rotations(time: np.ndarray, w: np.ndarray) -> np.ndarray:
 def rotation(g: np.ndarray) -> np.ndarray:
     """Of the rotation vector g [Rodrigues 1840]."""
     angle = np.linalg.norm(g)
-    cross = np.array([[0, -g[2], g[1]], [g[2], 0, -g[0]], [-g[1], g[0], 0]])
+    cross = skew(g)
     return np.eye(3) + np.sinc(angle / np.pi) * cross + 0.5 * np.sinc(angle / (2 * np.pi)) ** 2 * cross @ cross
 
 

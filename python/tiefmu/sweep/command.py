@@ -15,7 +15,7 @@ from ..acceptance import command as acceptance
 from ..acceptance.criteria import read as read_criteria
 from ..arguments import check_folder_of, whole
 from ..decks import is_deck
-from ..errors import RunError, SceneError, UsageError
+from ..errors import RunError, SceneError, UsageError, one_line
 from ..results import needed
 from ..scene import read_toml
 from . import table, worker
@@ -269,7 +269,7 @@ def run_cases(
                     for case in batch:
                         submit([case])
                     continue
-                rows = [(batch[0].number, {"message": f"its worker died: {' '.join(str(error).split())[:200]}"})]
+                rows = [(batch[0].number, {"message": f"its worker died: {one_line(error)[:200]}"})]
             journal.add(rows)
             bar.update(len(rows))
             fill()
