@@ -17,5 +17,6 @@ class RunStopped(RunError):
     """The FMU refused to go on, or gave no numbers."""
 
 
-def one_line(error) -> str:
+def one_line(error: object) -> str:
+    """What it says, its lines and tabs joined by blanks: for text of other packages within a message of ours."""
     return " ".join(str(error).split())

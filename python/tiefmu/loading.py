@@ -6,7 +6,7 @@ from pathlib import Path
 
 from . import decks, schema
 from ._core import SceneError
-from .scene import Scene, plain, printable, read_toml
+from .scene import Scene, escaped, plain, read_toml
 
 
 def load(source, expose: Sequence[str] = (), folder: Path | None = None, positions: bool = False) -> Scene:
@@ -34,4 +34,4 @@ def load(source, expose: Sequence[str] = (), folder: Path | None = None, positio
             scene = Scene(file, name, again, folder)
         return scene
     except SceneError as error:
-        raise SceneError(printable(f"{file}: {error}")) from None
+        raise SceneError(escaped(f"{file}: {error}")) from None

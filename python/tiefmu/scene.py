@@ -59,7 +59,7 @@ class Scene:
         return [f"{kind}.r" for kind, there in kinds.items() if there and f"{kind}.r" not in shown]
 
 
-def printable(message: str) -> str:
+def escaped(message: str) -> str:
     """The same with control characters and the like, which names may hold, written as escapes."""
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in message)
 

@@ -19,7 +19,7 @@ from .._core import SceneError
 from ..arguments import check_folder_of
 from ..errors import UsageError
 from ..report import of_each_kind
-from ..scene import Scene, printable
+from ..scene import Scene, escaped
 from . import abaqus, dyna, radioss, to_scene, write
 from .model import Deck
 from .settle import settle
@@ -151,7 +151,7 @@ def compiled(found: Imported, expose: Sequence[str] = ()) -> Scene:
             made.interface.expose += expose
             scene = Scene(found.deck.file, path.stem, made, Path(folder))
         except SceneError as error:
-            raise SceneError(printable(f"{found.deck.file}: {error}")) from None
+            raise SceneError(escaped(f"{found.deck.file}: {error}")) from None
     prefix = f"{found.deck.file}: "  # which whoever shows a scene's remarks adds
     scene.notes += [line.removeprefix(prefix) for line in write.remarks(found.deck)]
     scene.warnings += [line.removeprefix(prefix) for line in found.deck.warnings]

@@ -32,7 +32,7 @@ def read(path: Path) -> MeshFile:
     except ImportError as error:
         raise needed(error) from None
     except (Exception, SystemExit) as error:
-        words = " ".join((said.getvalue() if isinstance(error, SystemExit) else str(error)).split())
+        words = one_line(said.getvalue() if isinstance(error, SystemExit) else error)
         if path.suffix.lower() == ".cgns":
             words = "it knows CGNS of tetrahedra alone; save the mesh as Exodus, MED or Gmsh"
         elif isinstance(error, KeyError):
