@@ -111,15 +111,6 @@ void ArrayAccess::getLabels(const std::uint32_t refs[], std::size_t count, const
     for (const std::string& label : elementsOf(refs[i], true).labels) *values++ = label.c_str();
 }
 
-std::vector<std::uint32_t> ArrayAccess::scalars(const std::uint32_t refs[], std::size_t count, std::size_t size) {
-  spansOf(refs, count, size, spans_);
-  std::vector<std::uint32_t> result;
-  result.reserve(size);
-  for (const Span& s : spans_)
-    for (std::uint32_t k = 0; k < s.count; ++k) result.push_back(s.first + k);
-  return result;
-}
-
 void ArrayAccess::derivative(Way way, const std::uint32_t unknown[], std::size_t unknowns, const std::uint32_t known[],
                              std::size_t knowns, const double seed[], std::size_t seeds, double result[],
                              std::size_t results) {
@@ -135,11 +126,8 @@ void ArrayAccess::outputDerivatives(const std::uint32_t refs[], std::size_t coun
                                     std::size_t size) {
   requireArrays(refs, count, values, size);
   if (count > 0 && !orders) throw Refused("the array of orders is a null pointer");
-  const std::vector<std::uint32_t> of = scalars(refs, count, size);
-  std::vector<int> order;
-  order.reserve(size);
-  for (std::size_t i = 0; i < count; ++i) order.insert(order.end(), arrayOf(refs[i]).count(), orders[i]);
-  instance_.outputDerivatives(of.data(), of.size(), order.data(), values);
+  spansOf(refs, count, size, spans_);
+  instance_.outputDerivatives(spans_, orders, count, values);
 }
 
 std::vector<ArrayAccess::Entry> ArrayAccess::dependenciesOf(std::uint32_t reference) {

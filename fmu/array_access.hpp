@@ -39,8 +39,6 @@ class ArrayAccess {
   const Array& arrayOf(std::uint32_t reference) const;
   const Elements& elementsOf(std::uint32_t reference, bool labels) const;
   void spansOf(const std::uint32_t references[], std::size_t count, std::size_t size, std::vector<Span>& spans);
-  // Value references of FMI 2.0, element by element.
-  std::vector<std::uint32_t> scalars(const std::uint32_t references[], std::size_t count, std::size_t size);
   std::string nameOf(std::uint32_t reference) const;
 
   Instance& instance_;

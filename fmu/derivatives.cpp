@@ -18,31 +18,24 @@ std::size_t Instance::inputAt(std::uint32_t reference) const {
   return range.place + (reference - range.first);
 }
 
-void Instance::requireOutputs(const std::uint32_t refs[], std::size_t count) const {
-  forRuns(refs, count, [&](const Range& range, std::uint32_t first, std::size_t, std::size_t) {
-    require(range, first, Causality::output);
+std::vector<Span> Instance::spansOf(const std::uint32_t refs[], std::size_t count) const {
+  std::vector<Span> spans;
+  forRuns(refs, count, [&](const Range& range, std::uint32_t first, std::size_t run, std::size_t) {
+    spans.push_back({first, run, range.place + (first - range.first)});
   });
+  return spans;
 }
 
-void Instance::takeScratch(const std::uint32_t refs[], std::size_t count, double values[]) const {
-  forRuns(refs, count, [&](const Range& range, std::uint32_t first, std::size_t run, std::size_t i) {
-    std::copy_n(scratch.begin() + static_cast<std::ptrdiff_t>(range.place + (first - range.first)), run, values + i);
-  });
+void Instance::takeScratch(const std::vector<Span>& spans, double values[]) const {
+  for (const Span& s : spans)
+    values = std::copy_n(scratch.begin() + static_cast<std::ptrdiff_t>(s.place), s.count, values);
 }
 
 void Instance::directionalDerivative(const std::uint32_t unknown[], std::size_t unknowns, const std::uint32_t known[],
                                      std::size_t knowns, const double seed[], double change[]) {
-  if (knowns > 0 && !known) throw Refused("the array of value references is a null pointer");
   if ((unknowns > 0 && !change) || (knowns > 0 && !seed)) throw Refused("an array of values is a null pointer");
-  requireOutputs(unknown, unknowns);
-  scratch.assign(simulation.layout().size, 0.0);
-  for (std::size_t k = 0; k < knowns; ++k) {
-    const std::size_t place = inputAt(known[k]);
-    if (!std::isfinite(seed[k])) refuseValue(known[k], seed + k);
-    scratch[place] += seed[k];
-  }
-  simulation.directionalDerivative(scratch.data());
-  takeScratch(unknown, unknowns, change);
+  const std::vector<Span> of = spansOf(unknown, unknowns), by = spansOf(known, knowns);
+  derivative(Way::forward, of, by, seed, change);
 }
 
 void Instance::derivative(Way way, const std::vector<Span>& unknowns, const std::vector<Span>& knowns,
@@ -62,8 +55,7 @@ void Instance::derivative(Way way, const std::vector<Span>& unknowns, const std:
     simulation.directionalDerivative(scratch.data());
   else
     simulation.adjointDerivative(scratch.data());
-  for (const Span& s : forward ? unknowns : knowns)
-    result = std::copy_n(scratch.begin() + static_cast<std::ptrdiff_t>(s.place), s.count, result);
+  takeScratch(forward ? unknowns : knowns, result);
 }
 
 void Instance::setInputDerivatives(const std::uint32_t refs[], std::size_t count, const int orders[],
@@ -82,7 +74,12 @@ void Instance::setInputDerivatives(const std::uint32_t refs[], std::size_t count
 
 void Instance::outputDerivatives(const std::uint32_t refs[], std::size_t count, const int orders[], double values[]) {
   if (count > 0 && (!orders || !values)) throw Refused("an array of orders or values is a null pointer");
-  requireOutputs(refs, count);
+  outputDerivatives(spansOf(refs, count), orders, count, values);
+}
+
+void Instance::outputDerivatives(const std::vector<Span>& outputs, const int orders[], std::size_t count,
+                                 double values[]) {
+  for (const Span& s : outputs) require(rangeOf(s.first), s.first, Causality::output);
   for (std::size_t k = 0; k < count; ++k)
     if (orders[k] != 1) throw Refused("derivatives of outputs have order 1, not " + std::to_string(orders[k]));
   if (count == 0) return;
@@ -94,7 +91,7 @@ void Instance::outputDerivatives(const std::uint32_t refs[], std::size_t count, 
   } catch (const StepTooLong& e) {
     throw Refused(e.what());
   }
-  takeScratch(refs, count, values);
+  takeScratch(outputs, values);
 }
 
 }  // namespace tiefmu

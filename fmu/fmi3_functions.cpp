@@ -1,7 +1,6 @@
 // The functions of FMI 3.0 co-simulation. Each goes through `guard`: no exception leaves the library. What the standard
 // has beyond co-simulation without events and clocks is in fmi3_others.cpp.
 #include <algorithm>
-#include <cmath>
 #include <cstdio>
 #include <exception>
 #include <type_traits>
@@ -46,16 +45,15 @@ class CallbackLog final : public Log {
 // Where the importer wants to be asked, a step is done substep by substep: after each but the last it may set inputs,
 // get outputs, and have the step end earlier. True if it did.
 bool step(Fmi3Instance& own, double point, double size) {
-  constexpr double mostSubsteps = 1e9;
   Instance& i = own.instance;
-  i.beginStep(point, size);  // a step that is refused has not begun
+  i.checkStep(point, size);  // a step that is refused has not begun
   double end = point + size, left = size, at = point;
-  bool returnsEarly = false;
+  bool returnsEarly = false, last = false;
   for (;;) {
-    const double count = own.intermediateUpdate ? std::ceil(left / i.largestSubstep() * (1 - 1e-12)) : 1;
-    const bool last = !(count > 1 && count <= mostSubsteps);
     try {
-      i.doStep(at, last ? left : left / count);
+      const double count = own.intermediateUpdate ? i.substepsOf(left) : 1;
+      last = count == 1;
+      i.doStep(at, left / count);
     } catch (const Refused& e) {
       if (at == point) throw;
       throw std::runtime_error(e.what());

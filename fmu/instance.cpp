@@ -200,7 +200,7 @@ void Instance::set(const std::vector<Span>& spans, const double values[]) {
   copyRuns(changed);
 }
 
-void Instance::beginStep(double point, double step) {
+void Instance::checkStep(double point, double step) {
   if (!(step > 0) || !std::isfinite(step) || std::isinf(point + step))
     throw Refused("the step size " + text(step) + " s is not above zero and finite");
   const double allowed = tolerance(clock.time, step);
@@ -213,8 +213,16 @@ void Instance::beginStep(double point, double step) {
   if (step > host.step) warnOfStep(step);
 }
 
+double Instance::substepsOf(double step) const {
+  try {
+    return simulation.substepsOf(step);
+  } catch (const StepTooLong& e) {
+    throw Refused(e.what());
+  }
+}
+
 void Instance::doStep(double point, double step) {
-  beginStep(point, step);
+  checkStep(point, step);
   try {
     simulation.step(step);
   } catch (const StepTooLong& e) {

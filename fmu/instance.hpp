@@ -52,8 +52,8 @@ class Instance {
   void set(const std::vector<Span>& spans, const double values[]);
   void doStep(double currentCommunicationPoint, double communicationStepSize);
   // What it checks before anything changes; for a step that is done in parts.
-  void beginStep(double currentCommunicationPoint, double communicationStepSize);
-  double largestSubstep() const { return simulation.largestSubstep(); }
+  void checkStep(double currentCommunicationPoint, double communicationStepSize);
+  double substepsOf(double step) const;  // the simulation's; throws Refused
   const Model& model() const { return simulation.model(); }
   std::vector<Block> blocks() const { return variables(simulation.model(), simulation.layout()); }
   double time() const { return clock.time; }
@@ -77,6 +77,8 @@ class Instance {
   void setInputDerivatives(const std::uint32_t references[], std::size_t count, const int orders[],
                            const double values[]);
   void outputDerivatives(const std::uint32_t references[], std::size_t count, const int orders[], double values[]);
+  // The same for whole spans; `count`: of the orders.
+  void outputDerivatives(const std::vector<Span>& outputs, const int orders[], std::size_t count, double values[]);
 
  private:
   // References [first, end) stand at places [place, ...) of the simulation's array.
@@ -108,8 +110,8 @@ class Instance {
   template <class Use> void forRuns(const std::uint32_t references[], std::size_t count, Use use) const;
   void require(const Range& range, std::uint32_t reference, Causality causality) const;
   std::size_t inputAt(std::uint32_t reference) const;  // its place
-  void requireOutputs(const std::uint32_t references[], std::size_t count) const;
-  void takeScratch(const std::uint32_t references[], std::size_t count, double values[]) const;
+  std::vector<Span> spansOf(const std::uint32_t references[], std::size_t count) const;
+  void takeScratch(const std::vector<Span>& spans, double values[]) const;
   void warnOfStep(double step);
 
   std::string guid;

@@ -134,6 +134,16 @@ struct Simulation::Impl {
     field(Field::work)[Work::totalAtLastStep] = totalEnergy();
   }
 
+  double substepsOf(double duration) const {
+    const double largest = limit.ofStep();
+    const double count = std::max(1.0, std::ceil(duration / largest * (1 - 1e-12)));
+    if (count <= maxSubsteps) return count;
+    char text[160];
+    std::snprintf(text, sizeof text, "a step of %.6g s would take %.3g substeps of at most %.3g s", duration, count,
+                  largest);
+    throw StepTooLong(text);
+  }
+
   void integrate(double duration) {
     const double end = time + duration;
     double left = duration;
@@ -144,14 +154,7 @@ struct Simulation::Impl {
     if (energy) before = dynamics.power();
     while (left > 0) {
       // Equal substeps; planned anew only when the limit has fallen below them.
-      const double largest = limit.ofStep();
-      const double count = std::max(1.0, std::ceil(left / largest * (1 - 1e-12)));
-      if (!(count <= maxSubsteps)) {
-        char text[160];
-        std::snprintf(text, sizeof text, "a step of %.6g s would take %.3g substeps of at most %.3g s", duration, count,
-                      largest);
-        throw StepTooLong(text);
-      }
+      const double count = substepsOf(left);
       const std::int64_t n = static_cast<std::int64_t>(count);
       const double h = left / count;
       std::int64_t done = 0;
@@ -336,8 +339,8 @@ void Simulation::step(double duration) {
   s.flags |= stepped;
 }
 
-double Simulation::largestSubstep() const {
-  return impl_->model->anyFree() ? impl_->limit.ofStep() : std::numeric_limits<double>::infinity();
+double Simulation::substepsOf(double duration) const {
+  return impl_->model->anyFree() ? impl_->substepsOf(duration) : 1;
 }
 
 void Simulation::updateOutputs() {

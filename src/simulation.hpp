@@ -73,8 +73,9 @@ class Simulation {
 
   // Forces evaluated so far (a machine-independent cost).
   std::int64_t evaluations() const;
-  // The most that a substep takes now, s; infinite where nothing is integrated.
-  double largestSubstep() const;
+  // Equal substeps that a step of this duration, s, is planned in now; 1 where nothing is integrated. Throws
+  // StepTooLong.
+  double substepsOf(double duration) const;
   // Largest step the chosen integrator is stable at, damping included, s (1e30: none).
   double integratorLimit() const;
 
