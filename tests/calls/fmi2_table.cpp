@@ -40,7 +40,7 @@ int reset(Session& s) { return fmi2Reset(s.component); }
 
 int getReal(Session& s) {
   const int status = fmi2GetReal(s.component, s.packed.readable.data(), s.packed.readable.size(), s.read.data());
-  s.give(s.read.data(), s.read.size() * sizeof(double));
+  s.give(s.read);
   return status;
 }
 int getInteger(Session& s) { return fmi2GetInteger(s.component, nullptr, 0, nullptr); }
@@ -54,29 +54,11 @@ int setInteger(Session& s) { return fmi2SetInteger(s.component, nullptr, 0, null
 int setBoolean(Session& s) { return fmi2SetBoolean(s.component, nullptr, 0, nullptr); }
 int setString(Session& s) { return fmi2SetString(s.component, nullptr, 0, nullptr); }
 
-int getState(Session& s) { return fmi2GetFMUstate(s.component, &s.saved[1]); }
-int setState(Session& s) { return fmi2SetFMUstate(s.component, s.saved[s.saved[1] ? 1 : 0]); }
-int freeState(Session& s) { return fmi2FreeFMUstate(s.component, &s.saved[0]); }
-int serializedSize(Session& s) {
-  std::size_t size = 0;
-  const int status = fmi2SerializedFMUstateSize(s.component, s.saved[0], &size);
-  s.give(&size, sizeof size);
-  return status;
-}
-int serialize(Session& s) {
-  const int status = fmi2SerializeFMUstate(s.component, s.saved[0], s.buffer.data(), s.buffer.size());
-  s.give(s.buffer.data(), s.buffer.size());
-  return status;
-}
-int deSerialize(Session& s) {
-  return fmi2DeSerializeFMUstate(s.component, s.bytes[0].data(), s.bytes[0].size(), &s.saved[2]);
-}
-
 int getDirectionalDerivative(Session& s) {
   const Packed& p = s.packed;
   const int status = fmi2GetDirectionalDerivative(s.component, p.outputs.data(), p.outputs.size(), p.inputs.data(),
                                                   p.inputs.size(), s.change.data(), s.changes.data());
-  s.give(s.changes.data(), s.changes.size() * sizeof(double));
+  s.give(s.changes);
   return status;
 }
 int setInputDerivatives(Session& s) {
@@ -87,7 +69,7 @@ int getOutputDerivatives(Session& s) {
   const Packed& p = s.packed;
   const int status =
       fmi2GetRealOutputDerivatives(s.component, p.outputs.data(), p.outputs.size(), s.orders.data(), s.changes.data());
-  s.give(s.changes.data(), s.changes.size() * sizeof(double));
+  s.give(s.changes);
   return status;
 }
 
@@ -97,21 +79,15 @@ int getStatus(Session& s) {
   fmi2Status value = fmi2OK;
   return fmi2GetStatus(s.component, fmi2DoStepStatus, &value);
 }
-int getRealStatus(Session& s) {
-  fmi2Real value = -1;
-  const int status = fmi2GetRealStatus(s.component, fmi2LastSuccessfulTime, &value);
+template <class T, auto function, fmi2StatusKind kind> int numberStatus(Session& s) {
+  T value = -1;
+  const int status = function(s.component, kind, &value);
   s.give(&value, sizeof value);
   return status;
 }
 int getIntegerStatus(Session& s) {
   fmi2Integer value = -1;
   return fmi2GetIntegerStatus(s.component, fmi2DoStepStatus, &value);
-}
-int getBooleanStatus(Session& s) {
-  fmi2Boolean value = -1;
-  const int status = fmi2GetBooleanStatus(s.component, fmi2Terminated, &value);
-  s.give(&value, sizeof value);
-  return status;
 }
 int getStringStatus(Session& s) {
   fmi2String value = nullptr;
@@ -166,16 +142,16 @@ const Standard fmi2{
         {"fmi2FreeFMUstate", "x x x x x", freeState},
         {"fmi2SerializedFMUstateSize", "x x x x x", serializedSize},
         {"fmi2SerializeFMUstate", "x x x x x", serialize},
-        {"fmi2DeSerializeFMUstate", "x x x x x", deSerialize},
+        {"fmi2DeSerializeFMUstate", "x x x x x", deserialize},
         {"fmi2GetDirectionalDerivative", ". x x x x", getDirectionalDerivative},
         {"fmi2SetRealInputDerivatives", "x x x . .", setInputDerivatives},
         {"fmi2GetRealOutputDerivatives", ". . x x x", getOutputDerivatives},
         {"fmi2DoStep", ". . x . .", doStep},
         {"fmi2CancelStep", ". . . . .", cancelStep},
         {"fmi2GetStatus", ". . x x .", getStatus},
-        {"fmi2GetRealStatus", ". . x x .", getRealStatus},
+        {"fmi2GetRealStatus", ". . x x .", numberStatus<fmi2Real, fmi2GetRealStatus, fmi2LastSuccessfulTime>},
         {"fmi2GetIntegerStatus", ". . x x .", getIntegerStatus},
-        {"fmi2GetBooleanStatus", ". . x x .", getBooleanStatus},
+        {"fmi2GetBooleanStatus", ". . x x .", numberStatus<fmi2Boolean, fmi2GetBooleanStatus, fmi2Terminated>},
         {"fmi2GetStringStatus", ". . x x .", getStringStatus},
         {"fmi2EnterEventMode", ". . . . .", enterEventMode},
         {"fmi2NewDiscreteStates", ". . . . .", newDiscreteStates},
@@ -193,10 +169,6 @@ const Standard fmi2{
     "fmi2Terminate",
     "fmi2Reset",
     "fmi2GetReal",
-    "fmi2SetReal",
-    "fmi2GetFMUstate",
-    "fmi2SetFMUstate",
-    "fmi2DoStep",
     "fmi2Instantiate",
     {"fmi2DoStep", "fmi2DoStep", "fmi2SetReal", "fmi2GetReal", "fmi2SetRealInputDerivatives", "fmi2GetFMUstate",
      "fmi2SetFMUstate", "fmi2SerializeFMUstate", "fmi2DeSerializeFMUstate"},
@@ -232,17 +204,29 @@ const Standard fmi2{
       return fmi2SetReal(s.component, s.packed.inputs.data(), values.size(), values.data());
     },
     [](Session& s, double time, double size) -> int { return fmi2DoStep(s.component, time, size, fmi2False); },
-    [](Session& s, std::size_t slot) -> int { return fmi2GetFMUstate(s.component, &s.saved[slot]); },
-    [](Session& s, std::size_t slot, std::size_t list) -> int {
-      std::size_t size = 0;
-      const fmi2Status status = fmi2SerializedFMUstateSize(s.component, s.saved[slot], &size);
-      if (status != fmi2OK) return status;
-      s.bytes[list].resize(size);
-      return fmi2SerializeFMUstate(s.component, s.saved[slot], s.bytes[list].data(), size);
-    },
     [](Session& s, State believed) {
       fmi2Boolean over = fmi2False;
       return (believed == terminated ? fmi2GetBooleanStatus(s.component, fmi2Terminated, &over)
                                      : fmi2SetReal(s.component, nullptr, 0, nullptr)) != fmi2OK;
+    },
+    {
+        "fmi2GetFMUstate",
+        "fmi2SetFMUstate",
+        "fmi2FreeFMUstate",
+        "fmi2SerializedFMUstateSize",
+        "fmi2SerializeFMUstate",
+        "fmi2DeSerializeFMUstate",
+        [](Session& s, void** state) -> int { return fmi2GetFMUstate(s.component, state); },
+        [](Session& s, void* state) -> int { return fmi2SetFMUstate(s.component, state); },
+        [](Session& s, void** state) -> int { return fmi2FreeFMUstate(s.component, state); },
+        [](Session& s, void* state, std::size_t* size) -> int {
+          return fmi2SerializedFMUstateSize(s.component, state, size);
+        },
+        [](Session& s, void* state, char* bytes, std::size_t size) -> int {
+          return fmi2SerializeFMUstate(s.component, state, bytes, size);
+        },
+        [](Session& s, const char* bytes, std::size_t size, void** state) -> int {
+          return fmi2DeSerializeFMUstate(s.component, bytes, size, state);
+        },
     },
 };

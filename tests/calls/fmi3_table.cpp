@@ -58,7 +58,7 @@ int reset(Session& s) { return fmi3Reset(s.component); }
 int getFloat64(Session& s) {
   const References& all = s.packed.readable;
   const int status = fmi3GetFloat64(s.component, all.data(), all.size(), s.read.data(), s.read.size());
-  s.give(s.read.data(), s.read.size() * sizeof(double));
+  s.give(s.read);
   return status;
 }
 int setInputs(Session& s, const Values& values) {
@@ -66,26 +66,6 @@ int setInputs(Session& s, const Values& values) {
   return fmi3SetFloat64(s.component, inputs.data(), inputs.size(), values.data(), values.size());
 }
 int setFloat64(Session& s) { return setInputs(s, s.set); }
-
-int getState(Session& s) { return fmi3GetFMUState(s.component, &s.saved[1]); }
-int setState(Session& s) { return fmi3SetFMUState(s.component, s.saved[s.saved[1] ? 1 : 0]); }
-int freeState(Session& s) { return fmi3FreeFMUState(s.component, &s.saved[0]); }
-int serializedSize(Session& s) {
-  std::size_t size = 0;
-  const int status = fmi3SerializedFMUStateSize(s.component, s.saved[0], &size);
-  s.give(&size, sizeof size);
-  return status;
-}
-int serialize(Session& s) {
-  const int status =
-      fmi3SerializeFMUState(s.component, s.saved[0], reinterpret_cast<fmi3Byte*>(s.buffer.data()), s.buffer.size());
-  s.give(s.buffer.data(), s.buffer.size());
-  return status;
-}
-int deserialize(Session& s) {
-  return fmi3DeserializeFMUState(s.component, reinterpret_cast<const fmi3Byte*>(s.bytes[0].data()), s.bytes[0].size(),
-                                 &s.saved[2]);
-}
 
 int getNumberOfDependencies(Session& s) {
   std::size_t count = 0;
@@ -96,27 +76,20 @@ int getNumberOfDependencies(Session& s) {
 int getDependencies(Session& s) {  // of an input: there are none
   return fmi3GetVariableDependencies(s.component, s.packed.inputs[0], nullptr, nullptr, nullptr, nullptr, 0);
 }
-int getDirectionalDerivative(Session& s) {
+template <auto function> int derivative(Session& s, const Values& seed, Values& result) {
   const Packed& p = s.packed;
-  const int status =
-      fmi3GetDirectionalDerivative(s.component, p.outputs.data(), p.outputs.size(), p.inputs.data(), p.inputs.size(),
-                                   s.change.data(), s.change.size(), s.changes.data(), s.changes.size());
-  s.give(s.changes.data(), s.changes.size() * sizeof(double));
+  const int status = function(s.component, p.outputs.data(), p.outputs.size(), p.inputs.data(), p.inputs.size(),
+                              seed.data(), seed.size(), result.data(), result.size());
+  s.give(result);
   return status;
 }
-int getAdjointDerivative(Session& s) {
-  const Packed& p = s.packed;
-  const int status =
-      fmi3GetAdjointDerivative(s.component, p.outputs.data(), p.outputs.size(), p.inputs.data(), p.inputs.size(),
-                               s.weights.data(), s.weights.size(), s.gradient.data(), s.gradient.size());
-  s.give(s.gradient.data(), s.gradient.size() * sizeof(double));
-  return status;
-}
+int getDirectionalDerivative(Session& s) { return derivative<fmi3GetDirectionalDerivative>(s, s.change, s.changes); }
+int getAdjointDerivative(Session& s) { return derivative<fmi3GetAdjointDerivative>(s, s.weights, s.gradient); }
 int getOutputDerivatives(Session& s) {
   const Packed& p = s.packed;
   const int status = fmi3GetOutputDerivatives(s.component, p.outputs.data(), p.outputs.size(), s.orders.data(),
                                               s.changes.data(), s.changes.size());
-  s.give(s.changes.data(), s.changes.size() * sizeof(double));
+  s.give(s.changes);
   return status;
 }
 // Long enough for an importer to be asked, where one wants that.
@@ -233,10 +206,6 @@ const Standard fmi3{
     "fmi3Terminate",
     "fmi3Reset",
     "fmi3GetFloat64",
-    "fmi3SetFloat64",
-    "fmi3GetFMUState",
-    "fmi3SetFMUState",
-    "fmi3DoStep",
     "fmi3InstantiateCoSimulation",
     {"fmi3DoStep", "fmi3DoStep", "fmi3SetFloat64", "fmi3GetFloat64", "fmi3GetAdjointDerivative", "fmi3GetFMUState",
      "fmi3SetFMUState", "fmi3SerializeFMUState", "fmi3DeserializeFMUState"},
@@ -271,18 +240,30 @@ const Standard fmi3{
     [](Session& s) { fmi3FreeInstance(s.component); },
     setInputs,
     step,
-    [](Session& s, std::size_t slot) -> int { return fmi3GetFMUState(s.component, &s.saved[slot]); },
-    [](Session& s, std::size_t slot, std::size_t list) -> int {
-      std::size_t size = 0;
-      const fmi3Status status = fmi3SerializedFMUStateSize(s.component, s.saved[slot], &size);
-      if (status != fmi3OK) return status;
-      s.bytes[list].resize(size);
-      return fmi3SerializeFMUState(s.component, s.saved[slot], reinterpret_cast<fmi3Byte*>(s.bytes[list].data()), size);
-    },
     [](Session& s, State believed) {
       if (believed != terminated) return fmi3SetFloat64(s.component, nullptr, 0, nullptr, 0) != fmi3OK;
       fmi3ExitInitializationMode(s.component);  // the same calls are allowed: its refusal says the state
       const std::string& said = s.log.back().text;
       return said.find("Terminated") == std::string::npos;
+    },
+    {
+        "fmi3GetFMUState",
+        "fmi3SetFMUState",
+        "fmi3FreeFMUState",
+        "fmi3SerializedFMUStateSize",
+        "fmi3SerializeFMUState",
+        "fmi3DeserializeFMUState",
+        [](Session& s, void** state) -> int { return fmi3GetFMUState(s.component, state); },
+        [](Session& s, void* state) -> int { return fmi3SetFMUState(s.component, state); },
+        [](Session& s, void** state) -> int { return fmi3FreeFMUState(s.component, state); },
+        [](Session& s, void* state, std::size_t* size) -> int {
+          return fmi3SerializedFMUStateSize(s.component, state, size);
+        },
+        [](Session& s, void* state, char* bytes, std::size_t size) -> int {
+          return fmi3SerializeFMUState(s.component, state, reinterpret_cast<fmi3Byte*>(bytes), size);
+        },
+        [](Session& s, const char* bytes, std::size_t size, void** state) -> int {
+          return fmi3DeserializeFMUState(s.component, reinterpret_cast<const fmi3Byte*>(bytes), size, state);
+        },
     },
 };

@@ -13,7 +13,7 @@ void live(const Packed& packed) {
   require(by.step(session, 1e9, 1) == statusError, "a step from elsewhere was taken");
   session.saved[2] = nullptr;
   memory::failAfter(0, memory::Throws::badAlloc);
-  const int status = by.save(session, 2);
+  const int status = by.onStates.getInto(session, &session.saved[2]);
   memory::succeedAgain();
   require(status == statusError, "no memory, but no error");
   by.call(session, by.reset);

@@ -82,31 +82,29 @@ class Sequence {
     double start, stop;
     bool defined;
   };
-  Times times(bool spoil);
+  Times times(bool spoil);  // of the coming run, when the call succeeds
   // A point in time and the size of a step, and whether they have to be refused.
   struct Step {
     double point, size;
     bool refused;
   };
   Step nextStep(bool spoil);
-  std::vector<std::string> categories(bool spoil);
+  // Values to set inputs to, or parameters, and whether that has to be refused.
+  struct Setting {
+    const References* from;
+    References references;
+    Values values;
+    bool refused;
+  };
+  Setting setting();
+  Attempt setDebugLogging(bool spoil, int (*call)(Session&, std::uint64_t on, std::size_t, const char* const[]));
   // Index of an entry; mostly of one that holds something, unless it is to be written.
   template <class T> std::size_t filled(const std::vector<T>& list, bool written) {
     std::size_t at = random_.below(list.size());
     for (std::size_t tries = written ? 0 : 4; tries > 0 && list[at] == T{}; --tries) at = random_.below(list.size());
     return at;
   }
-  // Calls on states, which both standards have: what each of them is called.
-  struct StateCalls {
-    const char *get, *set, *free, *size, *serialize, *deserialize;
-    int (*getInto)(Session&, void** state);
-    int (*setTo)(Session&, void* state);
-    int (*freeAt)(Session&, void** state);
-    int (*sizeOf)(Session&, void* state, std::size_t* size);
-    int (*toBytes)(Session&, void* state, char* bytes, std::size_t size);
-    int (*fromBytes)(Session&, const char* bytes, std::size_t size, void** state);
-  };
-  Attempt onStates(const StateCalls& calls, const std::string& name, bool spoil);
+  Attempt onStates(const std::string& name, bool spoil);
 
   const Packed &packed_, &other_;
   Random random_;
@@ -127,7 +125,7 @@ class Sequence {
   // The state after a call that was not to be refused.
   void follow(const Row& r, int status);
   void trace(const Row& r, const Attempt& attempt, State before);
-  Attempt deserialize(const StateCalls& calls, std::size_t slot, std::size_t list, bool spoil);
+  Attempt onBytes(std::size_t slot, std::size_t list, bool spoil);
   // A state of another scene.
   std::vector<char> foreign();
 

@@ -32,24 +32,47 @@ Values Sequence::near(const References& references) {
 
 double Sequence::notFinite() { return random_.of(Values{nan, -nan, infinity, -infinity}); }
 
-std::vector<std::string> Sequence::categories(bool spoil) {
+Sequence::Setting Sequence::setting() {
+  const bool parameters = !packed_.parameters.empty() && random_.once(8);
+  const References& from = parameters ? packed_.parameters : packed_.inputs;
+  const References references = some(from);
+  Values values = near(references);
+  if (parameters)
+    for (double& v : values) v = random_.once(20) ? random_.of(Values{-1, 0, 1e-300, 1e300}) : random_.between(0.5, 2);
+  return {&from, references, values, parameters && !references.empty() && state_ == stepComplete};
+}
+
+Attempt Sequence::setDebugLogging(bool spoil, int (*call)(Session&, std::uint64_t, std::size_t, const char* const[])) {
   std::vector<std::string> names;
   for (std::size_t n = random_.below(3); n > 0; --n)
     names.push_back(
         random_.of(std::vector<std::string>{"logStatusError", "logStatusWarning", "logTie", "logStability", "logAll"}));
   const std::size_t kind = random_.below(3);
   if (spoil) names.push_back(kind == 0 ? "" : kind == 1 ? std::string(3000, '%') : "logEvents %s%n");
-  return names;
+  const std::uint64_t on = random_.bits();
+  const bool null = spoil && random_.once(2), nullName = spoil && random_.once(2);
+  return {[=](Session& s) {
+            std::vector<const char*> list;
+            for (const std::string& n : names) list.push_back(n.c_str());
+            if (nullName) list.back() = nullptr;
+            return call(s, on, list.size(), null ? nullptr : list.data());
+          },
+          spoil};
 }
 
 Sequence::Times Sequence::times(bool spoil) {
   const double start = random_.of(Values{0, 0, 1, -3, 1e6}), stop = start + random_.of(Values{0.1, 1, 1e3, 0});
   Times t{start, stop, random_.once(2)};
-  if (!spoil) return t;
-  if (t.defined && random_.once(2))
-    t.stop = random_.once(2) ? start - 1 : nan;
-  else
-    t.start = notFinite();
+  if (spoil) {
+    if (t.defined && random_.once(2))
+      t.stop = random_.once(2) ? start - 1 : nan;
+    else
+      t.start = notFinite();
+  }
+  after_ = [=, this] {
+    time_ = t.start;
+    stop_ = t.defined ? t.stop : infinity;
+  };
   return t;
 }
 
@@ -68,8 +91,8 @@ Sequence::Step Sequence::nextStep(bool spoil) {
   return s;
 }
 
-Attempt Sequence::onStates(const StateCalls& calls, const std::string& name, bool spoil) {
-  const StateCalls c = calls;
+Attempt Sequence::onStates(const std::string& name, bool spoil) {
+  const StateCalls& c = packed_.standard.onStates;
   const std::size_t slot = filled(tested_.saved, name == c.get || name == c.deserialize);
   const std::size_t list = filled(tested_.bytes, name == c.serialize);
   void* const wrong = random_.once(2) ? reinterpret_cast<void*>(std::uintptr_t{8}) : nullptr;
@@ -123,10 +146,10 @@ Attempt Sequence::onStates(const StateCalls& calls, const std::string& name, boo
             },
             spoil || empty};
   }
-  return deserialize(c, slot, list, spoil);
+  return onBytes(slot, list, spoil);
 }
 
-Attempt Sequence::deserialize(const StateCalls& c, std::size_t slot, std::size_t list, bool spoil) {
+Attempt Sequence::onBytes(std::size_t slot, std::size_t list, bool spoil) {
   std::vector<char> bytes = tested_.bytes[list];
   bool null = false, refused = bytes.empty();
   if (spoil) {
@@ -145,7 +168,7 @@ Attempt Sequence::deserialize(const StateCalls& c, std::size_t slot, std::size_t
     if (bytes == tested_.bytes[list]) bytes.push_back(0);
   }
   after_ = [=, this] { kept_[slot] = keptBytes_[list]; };
-  const auto fromBytes = c.fromBytes;
+  const auto fromBytes = packed_.standard.onStates.fromBytes;
   return {[=](Session& s) { return fromBytes(s, null ? nullptr : bytes.data(), bytes.size(), &s.saved[slot]); },
           refused};
 }

@@ -18,7 +18,6 @@ class SequenceOfFmi2 final : public Sequence {
     return random_.once(4) ? "fmi2SetupExperiment" : "fmi2EnterInitializationMode";
   }
   Attempt make(const Row& r, bool spoil) override;
-  Attempt setDebugLogging(bool spoil);
   Attempt setupExperiment(bool spoil);
   Attempt getReal(bool spoil);
   Attempt setReal(bool spoil);
@@ -28,38 +27,19 @@ class SequenceOfFmi2 final : public Sequence {
   Attempt outputDerivatives(bool spoil);
   Attempt statusOf(const std::string& name, bool spoil);
   Attempt otherTypes(const std::string& name, bool spoil);
-  static const StateCalls stateCalls;
-};
-
-const Sequence::StateCalls SequenceOfFmi2::stateCalls{
-    "fmi2GetFMUstate",
-    "fmi2SetFMUstate",
-    "fmi2FreeFMUstate",
-    "fmi2SerializedFMUstateSize",
-    "fmi2SerializeFMUstate",
-    "fmi2DeSerializeFMUstate",
-    [](Session& s, void** state) -> int { return fmi2GetFMUstate(s.component, state); },
-    [](Session& s, void* state) -> int { return fmi2SetFMUstate(s.component, state); },
-    [](Session& s, void** state) -> int { return fmi2FreeFMUstate(s.component, state); },
-    [](Session& s, void* state, std::size_t* size) -> int {
-      return fmi2SerializedFMUstateSize(s.component, state, size);
-    },
-    [](Session& s, void* state, char* bytes, std::size_t size) -> int {
-      return fmi2SerializeFMUstate(s.component, state, bytes, size);
-    },
-    [](Session& s, const char* bytes, std::size_t size, void** state) -> int {
-      return fmi2DeSerializeFMUstate(s.component, bytes, size, state);
-    },
 };
 
 Attempt SequenceOfFmi2::make(const Row& r, bool spoil) {
   const std::string name = r.name;
-  if (name == "fmi2SetDebugLogging") return setDebugLogging(spoil);
+  if (name == "fmi2SetDebugLogging")
+    return setDebugLogging(spoil, [](Session& s, std::uint64_t on, std::size_t count, const char* const* names) -> int {
+      return fmi2SetDebugLogging(s.component, static_cast<fmi2Boolean>(on), count, names);
+    });
   if (name == "fmi2SetupExperiment") return setupExperiment(spoil);
   if (name == "fmi2GetReal") return getReal(spoil);
   if (name == "fmi2SetReal") return setReal(spoil);
   if (name == "fmi2DoStep") return doStep(spoil);
-  if (name.find("FMUstate") != std::string::npos) return onStates(stateCalls, name, spoil);
+  if (name.find("FMUstate") != std::string::npos) return onStates(name, spoil);
   if (name == "fmi2GetDirectionalDerivative") return directional(spoil);
   if (name == "fmi2SetRealInputDerivatives") return inputDerivatives(spoil);
   if (name == "fmi2GetRealOutputDerivatives") return outputDerivatives(spoil);
@@ -70,25 +50,8 @@ Attempt SequenceOfFmi2::make(const Row& r, bool spoil) {
   return {r.call, false};
 }
 
-Attempt SequenceOfFmi2::setDebugLogging(bool spoil) {
-  const std::vector<std::string> names = categories(spoil);
-  const fmi2Boolean on = static_cast<fmi2Boolean>(random_.bits());
-  const bool null = spoil && random_.once(2), nullName = spoil && random_.once(2);
-  return {[=](Session& s) {
-            std::vector<fmi2String> list;
-            for (const std::string& n : names) list.push_back(n.c_str());
-            if (nullName) list.back() = nullptr;
-            return fmi2SetDebugLogging(s.component, on, list.size(), null ? nullptr : list.data());
-          },
-          spoil};
-}
-
 Attempt SequenceOfFmi2::setupExperiment(bool spoil) {
   const Times t = times(spoil);
-  after_ = [=, this] {
-    time_ = t.start;
-    stop_ = t.defined ? t.stop : infinity;
-  };
   const double tolerance = random_.once(2) ? nan : 1e-3;
   return {[=](Session& s) { return fmi2SetupExperiment(s.component, fmi2True, tolerance, t.start, t.defined, t.stop); },
           spoil};
@@ -106,48 +69,43 @@ Attempt SequenceOfFmi2::getReal(bool spoil) {
             Values values(references.size(), nan);
             const int status = fmi2GetReal(s.component, nullReferences ? nullptr : references.data(), references.size(),
                                            nullValues ? nullptr : values.data());
-            if (status == fmi2OK) s.give(values.data(), values.size() * sizeof(double));
+            if (status == fmi2OK) s.give(values);
             return status;
           },
           spoil};
 }
 
 Attempt SequenceOfFmi2::setReal(bool spoil) {
-  const bool parameters = !packed_.parameters.empty() && random_.once(8);
-  References references = some(parameters ? packed_.parameters : packed_.inputs);
-  Values values = near(references), none;
-  for (double& v : parameters ? values : none)
-    v = random_.once(20) ? random_.of(Values{-1, 0, 1e-300, 1e300}) : random_.between(0.5, 2);
-  bool refused = parameters && !references.empty() && state_ == stepComplete;
+  Setting wanted = setting();
   bool nullReferences = false, nullValues = false;
   if (spoil) {
-    refused = true;
+    wanted.refused = true;
     switch (random_.below(4)) {
       case 0:
-        references.push_back(random_.once(2) ? unknown()
-                                             : random_.of(random_.once(2) ? packed_.calculated : packed_.outputs));
-        values.push_back(1);
+        wanted.references.push_back(
+            random_.once(2) ? unknown() : random_.of(random_.once(2) ? packed_.calculated : packed_.outputs));
+        wanted.values.push_back(1);
         break;
       case 1:
-        references.push_back(packed_.inputs[0]);
-        values.push_back(notFinite());
+        wanted.references.push_back(packed_.inputs[0]);
+        wanted.values.push_back(notFinite());
         break;
       default:
-        references.push_back(packed_.inputs[0]);
-        values.push_back(1);
+        wanted.references.push_back(packed_.inputs[0]);
+        wanted.values.push_back(1);
         (random_.once(2) ? nullReferences : nullValues) = true;
     }
-    std::swap(references[random_.below(references.size())], references.back());
-    if (!std::isfinite(values.back())) {  // keep the two lists together
-      references = {packed_.inputs[0]};
-      values = {values.back()};
+    std::swap(wanted.references[random_.below(wanted.references.size())], wanted.references.back());
+    if (!std::isfinite(wanted.values.back())) {  // keep the two lists together
+      wanted.references = {packed_.inputs[0]};
+      wanted.values = {wanted.values.back()};
     }
   }
   return {[=](Session& s) {
-            return fmi2SetReal(s.component, nullReferences ? nullptr : references.data(), references.size(),
-                               nullValues ? nullptr : values.data());
+            return fmi2SetReal(s.component, nullReferences ? nullptr : wanted.references.data(),
+                               wanted.references.size(), nullValues ? nullptr : wanted.values.data());
           },
-          refused};
+          wanted.refused};
 }
 
 Attempt SequenceOfFmi2::doStep(bool spoil) {
@@ -176,7 +134,7 @@ Attempt SequenceOfFmi2::directional(bool spoil) {
                 fmi2GetDirectionalDerivative(s.component, null == 0 ? nullptr : unknowns.data(), unknowns.size(),
                                              null == 1 ? nullptr : knowns.data(), knowns.size(),
                                              null == 2 ? nullptr : change.data(), null == 3 ? nullptr : changes.data());
-            if (status == fmi2OK) s.give(changes.data(), changes.size() * sizeof(double));
+            if (status == fmi2OK) s.give(changes);
             return status;
           },
           spoil};
@@ -228,7 +186,7 @@ Attempt SequenceOfFmi2::outputDerivatives(bool spoil) {
             const int status =
                 fmi2GetRealOutputDerivatives(s.component, null == 0 ? nullptr : references.data(), references.size(),
                                              null == 1 ? nullptr : orders.data(), null == 2 ? nullptr : values.data());
-            if (status == fmi2OK) s.give(values.data(), values.size() * sizeof(double));
+            if (status == fmi2OK) s.give(values);
             return status;
           },
           spoil};
@@ -236,23 +194,17 @@ Attempt SequenceOfFmi2::outputDerivatives(bool spoil) {
 
 Attempt SequenceOfFmi2::statusOf(const std::string& name, bool spoil) {
   const auto kind = static_cast<fmi2StatusKind>(random_.below(4));
-  const bool null = spoil;
-  if (name == "fmi2GetRealStatus")
+  const auto number = [&](auto begin, auto function) -> Attempt {
     return {[=](Session& s) {
-              fmi2Real value = -1;
-              const int status = fmi2GetRealStatus(s.component, kind, null ? nullptr : &value);
+              auto value = begin;
+              const int status = function(s.component, kind, spoil ? nullptr : &value);
               s.give(&value, sizeof value);
               return status;
             },
-            null};
-  if (name == "fmi2GetBooleanStatus")
-    return {[=](Session& s) {
-              fmi2Boolean value = -1;
-              const int status = fmi2GetBooleanStatus(s.component, kind, null ? nullptr : &value);
-              s.give(&value, sizeof value);
-              return status;
-            },
-            null};
+            spoil};
+  };
+  if (name == "fmi2GetRealStatus") return number(fmi2Real{-1}, fmi2GetRealStatus);
+  if (name == "fmi2GetBooleanStatus") return number(fmi2Boolean{-1}, fmi2GetBooleanStatus);
   // The others have no value to give, whatever is asked: they write nowhere.
   if (name == "fmi2GetIntegerStatus")
     return {[=](Session& s) { return fmi2GetIntegerStatus(s.component, kind, nullptr); }};

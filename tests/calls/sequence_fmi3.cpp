@@ -18,7 +18,6 @@ class SequenceOfFmi3 final : public Sequence {
     return state == instantiated ? "fmi3EnterInitializationMode" : "fmi3ExitInitializationMode";
   }
   Attempt make(const Row& r, bool spoil) override;
-  Attempt setDebugLogging(bool spoil);
   Attempt enterInitializationMode(bool spoil);
   Attempt getFloat64(bool spoil);
   Attempt setFloat64(bool spoil);
@@ -30,39 +29,20 @@ class SequenceOfFmi3 final : public Sequence {
   std::size_t sizeOf(const References& references) const { return packed_.startOf(references).size(); }
   // Not of these variables, and not even the time.
   std::uint32_t otherThan(const References& list);
-  static const StateCalls stateCalls;
-};
-
-const Sequence::StateCalls SequenceOfFmi3::stateCalls{
-    "fmi3GetFMUState",
-    "fmi3SetFMUState",
-    "fmi3FreeFMUState",
-    "fmi3SerializedFMUStateSize",
-    "fmi3SerializeFMUState",
-    "fmi3DeserializeFMUState",
-    [](Session& s, void** state) -> int { return fmi3GetFMUState(s.component, state); },
-    [](Session& s, void* state) -> int { return fmi3SetFMUState(s.component, state); },
-    [](Session& s, void** state) -> int { return fmi3FreeFMUState(s.component, state); },
-    [](Session& s, void* state, std::size_t* size) -> int {
-      return fmi3SerializedFMUStateSize(s.component, state, size);
-    },
-    [](Session& s, void* state, char* bytes, std::size_t size) -> int {
-      return fmi3SerializeFMUState(s.component, state, reinterpret_cast<fmi3Byte*>(bytes), size);
-    },
-    [](Session& s, const char* bytes, std::size_t size, void** state) -> int {
-      return fmi3DeserializeFMUState(s.component, reinterpret_cast<const fmi3Byte*>(bytes), size, state);
-    },
 };
 
 Attempt SequenceOfFmi3::make(const Row& r, bool spoil) {
   const std::string name = r.name;
-  if (name == "fmi3SetDebugLogging") return setDebugLogging(spoil);
+  if (name == "fmi3SetDebugLogging")
+    return setDebugLogging(spoil, [](Session& s, std::uint64_t on, std::size_t count, const char* const* names) -> int {
+      return fmi3SetDebugLogging(s.component, on % 2 == 0, count, names);
+    });
   if (name == "fmi3EnterInitializationMode") return enterInitializationMode(spoil);
   if (name == "fmi3GetFloat64") return getFloat64(spoil);
   if (name == "fmi3SetFloat64") return setFloat64(spoil);
   if (name == "fmi3GetInt64" || name == "fmi3GetString") return getOthers(name == "fmi3GetString", spoil);
   if (name == "fmi3DoStep") return doStep(spoil);
-  if (name.find("FMUState") != std::string::npos) return onStates(stateCalls, name, spoil);
+  if (name.find("FMUState") != std::string::npos) return onStates(name, spoil);
   if (name == "fmi3GetVariableDependencies") return dependencies(spoil);
   if (name == "fmi3GetDirectionalDerivative") return derivative(false, spoil);
   if (name == "fmi3GetAdjointDerivative") return derivative(true, spoil);
@@ -85,24 +65,8 @@ std::uint32_t SequenceOfFmi3::otherThan(const References& list) {
   return random_.of(others);
 }
 
-Attempt SequenceOfFmi3::setDebugLogging(bool spoil) {
-  const std::vector<std::string> names = categories(spoil);
-  const bool on = random_.once(2), null = spoil && random_.once(2), nullName = spoil && random_.once(2);
-  return {[=](Session& s) {
-            std::vector<fmi3String> list;
-            for (const std::string& n : names) list.push_back(n.c_str());
-            if (nullName) list.back() = nullptr;
-            return fmi3SetDebugLogging(s.component, on, list.size(), null ? nullptr : list.data());
-          },
-          spoil};
-}
-
 Attempt SequenceOfFmi3::enterInitializationMode(bool spoil) {
   const Times t = times(spoil);
-  after_ = [=, this] {
-    time_ = t.start;
-    stop_ = t.defined ? t.stop : infinity;
-  };
   const bool tolerant = random_.once(2);
   return {[=](Session& s) {
             return fmi3EnterInitializationMode(s.component, tolerant, tolerant ? nan : 1e-3, t.start, t.defined,
@@ -129,44 +93,42 @@ Attempt SequenceOfFmi3::getFloat64(bool spoil) {
             Values values(size, nan);
             const int status = fmi3GetFloat64(s.component, nullReferences ? nullptr : references.data(),
                                               references.size(), nullValues ? nullptr : values.data(), values.size());
-            if (status == statusOk) s.give(values.data(), values.size() * sizeof(double));
+            if (status == statusOk) s.give(values);
             return status;
           },
           spoil};
 }
 
 Attempt SequenceOfFmi3::setFloat64(bool spoil) {
-  const bool parameters = !packed_.parameters.empty() && random_.once(8);
-  const References& from = parameters ? packed_.parameters : packed_.inputs;
-  References references = some(from);
-  Values values = near(references), none;
-  for (double& v : parameters ? values : none)
-    v = random_.once(20) ? random_.of(Values{-1, 0, 1e-300, 1e300}) : random_.between(0.5, 2);
-  bool refused = parameters && !references.empty() && state_ == stepComplete;
+  Setting wanted = setting();
   bool nullReferences = false, nullValues = false;
   if (spoil) {
-    refused = true;
-    references.push_back(packed_.inputs[0]);
+    wanted.refused = true;
+    wanted.references.push_back(packed_.inputs[0]);
     const Values more = packed_.startOf({packed_.inputs[0]});
-    values.insert(values.end(), more.begin(), more.end());
+    wanted.values.insert(wanted.values.end(), more.begin(), more.end());
     switch (random_.below(5)) {
-      case 0: references[random_.below(references.size())] = random_.once(2) ? unknown() : otherThan(from); break;
-      case 1: values.back() = notFinite(); break;
+      case 0:
+        wanted.references[random_.below(wanted.references.size())] =
+            random_.once(2) ? unknown() : otherThan(*wanted.from);
+        break;
+      case 1: wanted.values.back() = notFinite(); break;
       case 2:
         if (random_.once(2))
-          values.pop_back();
+          wanted.values.pop_back();
         else
-          values.push_back(0);
+          wanted.values.push_back(0);
         break;
       case 3: nullReferences = true; break;
       default: nullValues = true;
     }
   }
   return {[=](Session& s) {
-            return fmi3SetFloat64(s.component, nullReferences ? nullptr : references.data(), references.size(),
-                                  nullValues ? nullptr : values.data(), values.size());
+            return fmi3SetFloat64(s.component, nullReferences ? nullptr : wanted.references.data(),
+                                  wanted.references.size(), nullValues ? nullptr : wanted.values.data(),
+                                  wanted.values.size());
           },
-          refused};
+          wanted.refused};
 }
 
 Attempt SequenceOfFmi3::getOthers(bool labels, bool spoil) {
@@ -192,7 +154,7 @@ Attempt SequenceOfFmi3::getOthers(bool labels, bool spoil) {
             }
             std::vector<fmi3Int64> ids(size);
             const fmi3Status status = fmi3GetInt64(s.component, list, references.size(), ids.data(), size);
-            if (status == fmi3OK) s.give(ids.data(), size * sizeof(fmi3Int64));
+            if (status == fmi3OK) s.give(ids);
             return status;
           },
           spoil};
@@ -241,7 +203,7 @@ Attempt SequenceOfFmi3::dependencies(bool spoil) {
             const fmi3Status status = fmi3GetVariableDependencies(
                 s.component, reference, null == 0 ? nullptr : dependent.data(), null == 1 ? nullptr : variables.data(),
                 null == 2 ? nullptr : independent.data(), null == 3 ? nullptr : kinds.data(), count);
-            if (status == fmi3OK) s.give(variables.data(), count * sizeof(std::uint32_t));
+            if (status == fmi3OK) s.give(variables);
             return status;
           },
           refused};
@@ -273,7 +235,7 @@ Attempt SequenceOfFmi3::derivative(bool adjoint, bool spoil) {
                 call(s.component, null == 0 ? nullptr : unknowns.data(), unknowns.size(),
                      null == 1 ? nullptr : knowns.data(), knowns.size(), null == 2 ? nullptr : seed.data(), seed.size(),
                      null == 3 ? nullptr : result.data(), result.size());
-            if (status == fmi3OK) s.give(result.data(), result.size() * sizeof(double));
+            if (status == fmi3OK) s.give(result);
             return status;
           },
           spoil};
@@ -299,7 +261,7 @@ Attempt SequenceOfFmi3::outputDerivatives(bool spoil) {
             const fmi3Status status = fmi3GetOutputDerivatives(s.component, null == 0 ? nullptr : references.data(),
                                                                references.size(), null == 1 ? nullptr : orders.data(),
                                                                null == 2 ? nullptr : values.data(), values.size());
-            if (status == fmi3OK) s.give(values.data(), values.size() * sizeof(double));
+            if (status == fmi3OK) s.give(values);
             return status;
           },
           spoil};

@@ -23,7 +23,7 @@ const Row& Sequence::next() {
     case instantiated:
     case initializationMode: return by.row(onTheWay(state_));
     case stepComplete: return by.row(random_.of(by.running));
-    default: return random_.once(4) ? by.row(by.setState) : random_.of(by.rows);
+    default: return random_.once(4) ? by.row(by.onStates.set) : random_.of(by.rows);
   }
 }
 

@@ -120,6 +120,24 @@ const Row& Standard::row(const std::string& name) const {
   fail("no row for " + name);
 }
 
+int getState(Session& s) { return s.packed.standard.onStates.getInto(s, &s.saved[1]); }
+int setState(Session& s) { return s.packed.standard.onStates.setTo(s, s.saved[s.saved[1] ? 1 : 0]); }
+int freeState(Session& s) { return s.packed.standard.onStates.freeAt(s, &s.saved[0]); }
+int serializedSize(Session& s) {
+  std::size_t size = 0;
+  const int status = s.packed.standard.onStates.sizeOf(s, s.saved[0], &size);
+  s.give(&size, sizeof size);
+  return status;
+}
+int serialize(Session& s) {
+  const int status = s.packed.standard.onStates.toBytes(s, s.saved[0], s.buffer.data(), s.buffer.size());
+  s.give(s.buffer);
+  return status;
+}
+int deserialize(Session& s) {
+  return s.packed.standard.onStates.fromBytes(s, s.bytes[0].data(), s.bytes[0].size(), &s.saved[2]);
+}
+
 void bring(Session& session, State state) {
   const Standard& by = session.packed.standard;
   const auto must = [&](int status) {
@@ -131,14 +149,17 @@ void bring(Session& session, State state) {
   if (state == terminated) must(by.call(session, by.terminate));
   if (state == error) {
     memory::failAfter(0, memory::Throws::badAlloc);
-    const int status = by.save(session, 1);
+    const int status = getState(session);
     memory::succeedAgain();
     require(status == statusError, "no memory, but no error");
     session.log.clear();
   }
-  must(by.save(session, 0));
-  must(by.pack(session, 0, 0));
-  session.buffer.resize(session.bytes[0].size());
+  std::size_t size = 0;
+  must(by.onStates.getInto(session, &session.saved[0]));
+  must(by.onStates.sizeOf(session, session.saved[0], &size));
+  session.bytes[0].resize(size);
+  must(by.onStates.toBytes(session, session.saved[0], session.bytes[0].data(), size));
+  session.buffer.resize(size);
   session.log.clear();
 }
 

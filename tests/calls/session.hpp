@@ -70,6 +70,7 @@ class Session {
   std::string result;                                                        // what the last call wrote
 
   void give(const void* data, std::size_t size);  // sets `result`
+  template <class T> void give(const std::vector<T>& list) { give(list.data(), list.size() * sizeof(T)); }
 
   // Arguments of the calls in the table, there before the call: they must not allocate when memory fails.
   Values read, set, change, slope, changes, weights, gradient;
@@ -87,11 +88,30 @@ struct Row {
   bool with(State state) const { return allowed[2 * state] == 'x'; }
 };
 
+// The calls on states: what a standard calls them, and how they are called.
+struct StateCalls {
+  const char *get, *set, *free, *size, *serialize, *deserialize;
+  int (*getInto)(Session&, void** state);
+  int (*setTo)(Session&, void* state);
+  int (*freeAt)(Session&, void** state);
+  int (*sizeOf)(Session&, void* state, std::size_t* size);
+  int (*toBytes)(Session&, void* state, char* bytes, std::size_t size);
+  int (*fromBytes)(Session&, const char* bytes, std::size_t size, void** state);
+};
+
+// One of each with good arguments, by either standard.
+int getState(Session& session);
+int setState(Session& session);
+int freeState(Session& session);
+int serializedSize(Session& session);
+int serialize(Session& session);
+int deserialize(Session& session);
+
 // A standard: its table of functions, for the states that this FMU can be in, and what the tests do by either.
 struct Standard {
   const char* stateName[states];
   std::vector<Row> rows;
-  const char *enter, *exit, *terminate, *reset, *get, *set, *getState, *setState, *doStep, *instantiateName;
+  const char *enter, *exit, *terminate, *reset, *get, *instantiateName;
   std::vector<const char*> running;  // what a caller does in a run, for the most part
   std::vector<const char*> script;   // a life that does everything, in order
   std::vector<const char*> never;    // what those refusals say that depend on no state
@@ -99,9 +119,8 @@ struct Standard {
   void (*free)(Session&);
   int (*setInputs)(Session&, const Values& values);
   int (*step)(Session&, double time, double size);
-  int (*save)(Session&, std::size_t slot);                    // to saved[slot]
-  int (*pack)(Session&, std::size_t slot, std::size_t list);  // saved[slot] to bytes[list], which takes its size
-  bool (*fails)(Session&, State believed);                    // is it in the state `error` instead?
+  bool (*fails)(Session&, State believed);  // is it in the state `error` instead?
+  StateCalls onStates;
 
   const Row& row(const std::string& name) const;
   int call(Session& session, const std::string& name) const { return row(name).call(session); }
