@@ -8,7 +8,7 @@ from pathlib import Path
 
 import fmpy
 import numpy as np
-import tiefmu
+from fmu_calls import build_without_references
 from tiefmu.fmi3_variables import elements
 from tiefmu.platforms import here
 
@@ -27,12 +27,12 @@ Update = ctypes.CFUNCTYPE(
 
 
 class Fmu:
-    """A scene built with fmi=3 and unpacked into a new folder in `folder`. arrays: FMPy's variables by name; elements:
-    by the names that FMI 2.0 has for them."""
+    """A scene built with fmi=3, without reference results, and unpacked into a new folder in `folder`. arrays: FMPy's
+    variables by name; elements: by the names that FMI 2.0 has for them."""
 
     def __init__(self, scene, folder: Path):
         self.folder = Path(tempfile.mkdtemp(dir=folder))
-        self.path = tiefmu.build(tiefmu.load(scene), self.folder / "scene.fmu", fmi=3)
+        self.path = build_without_references(scene, self.folder / "scene.fmu", fmi=3)
         with zipfile.ZipFile(self.path) as archive:
             archive.extractall(self.folder)
         self.description = fmpy.read_model_description(str(self.path), validate=True)

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import fmpy
 import numpy as np
+import pytest
 import tiefmu
 from tiefmu.platforms import here
 
@@ -40,14 +41,21 @@ class Callbacks(ctypes.Structure):
     ]
 
 
+def build_without_references(scene, path: Path, fmi: int = 2) -> Path:
+    """The FMU but for its reference results: to run them takes seconds where a scene needs many substeps."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("tiefmu.content.reference", lambda *_: {})
+        return tiefmu.build(tiefmu.load(scene), path, fmi=fmi)
+
+
 class Fmu:
-    """A scene (dict or TOML file) built, or an FMU, unpacked into a new folder in `folder`, with its description read
-    and validated."""
+    """A scene (dict or TOML file) built, without reference results, or an FMU, unpacked into a new folder in `folder`,
+    with its description read and validated."""
 
     def __init__(self, scene, folder: Path):
         self.folder = Path(tempfile.mkdtemp(dir=folder))  # a library that is loaded must not be overwritten
         made = isinstance(scene, Path) and scene.suffix == ".fmu"
-        self.path = scene if made else tiefmu.build(tiefmu.load(scene), self.folder / "scene.fmu")
+        self.path = scene if made else build_without_references(scene, self.folder / "scene.fmu")
         with zipfile.ZipFile(self.path) as archive:
             archive.extractall(self.folder)
         self.description = fmpy.read_model_description(

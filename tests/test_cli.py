@@ -300,18 +300,18 @@ def test_a_run_that_diverges_says_where(free, scene_file, capsys):
     assert len(lines) == 1 and lines[0].startswith("error: weld.toml: stopped at t = ")
 
 
-def test_exit_statuses_of_the_process(weld, scene_file, command):
+def test_exit_statuses_of_the_process(weld, scene_file, process):
     name = scene_file(weld)
-    good = command("build", name)
+    good = process("build", name)
     assert good.returncode == 0 and good.stdout.startswith("weld.fmu: ")
     weld["tie"][0]["slaves"] = [999]
-    bad = command("build", scene_file(weld))
+    bad = process("build", scene_file(weld))
     assert (bad.returncode, bad.stdout, bad.stderr) == (
         2,
         "",
         "error: weld.toml: tie 'weld': slaves: node 999 is not in the mesh (ids 1..101)\n",
     )
-    nothing = command()
+    nothing = process()
     assert nothing.returncode == 2 and "COMMAND" in nothing.stderr and "Traceback" not in nothing.stderr
 
 

@@ -82,7 +82,10 @@ def test_dependencies(case, ports, tmp_path):
 
 @pytest.fixture(scope="module")
 def fmu(tmp_path_factory):
-    return Fmu(case_scene((("default", True, "consistent", "full", "finite"), "mixed")), tmp_path_factory.mktemp("fmu"))
+    """With reference results."""
+    folder = tmp_path_factory.mktemp("fmu")
+    made = case_scene((("default", True, "consistent", "full", "finite"), "mixed"))
+    return Fmu(tiefmu.build(tiefmu.load(made), folder / "ports.fmu"), folder)
 
 
 def started(fmu, seed=23) -> Instance:

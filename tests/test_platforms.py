@@ -1,5 +1,6 @@
 """Libraries of an FMU: what their headers say, what `build` takes, and what `run` refuses to load."""
 
+import json
 import shutil
 import struct
 import subprocess
@@ -233,29 +234,50 @@ def test_make_binaries_says_what_is_unknown_or_missing(tmp_path):
 # ------------------------------------------------------------------------------------------------------------- running
 
 
-def test_run_refuses_a_library_that_it_cannot_load(weld, scene_file, command, tmp_path):
-    """Each in a process of its own, which such a library would end."""
+RUNS = """
+import contextlib, io, json, sys
+from tiefmu.cli import main
+for name in sys.argv[1:]:
+    with contextlib.redirect_stdout(io.StringIO()) as out, contextlib.redirect_stderr(io.StringIO()) as error:
+        status = main(["run", name, "--stop-time", "0.01"])
+    print(json.dumps([name, status, out.getvalue(), error.getvalue()]), flush=True)
+"""
+
+
+def test_run_refuses_a_library_that_it_cannot_load(weld, tmp_path):
+    """In a process of their own, which such a library would end."""
     fmu = tiefmu.build(tiefmu.load(weld), tmp_path / "good.fmu")
     place = f"binaries/{here().folder}/scene{here().suffix}"
     own = f"{here().system} on {here().machine}"
     other = struct.pack("<H", 183 if here().machine != "aarch64" else 62)
     foreign = "aarch64" if here().machine != "aarch64" else "x86_64"
-    for library, folder, line in (
-        (OWN.data[: len(OWN.data) // 2], None, f"{place}: is cut short: {len(OWN.data) // 2} of "),
-        (OWN.data[:40], None, f"{place}: is cut short"),
-        (b"", None, f"{place}: is no shared library"),
-        (b"hello", None, f"{place}: is no shared library"),
-        (windows(), None, f"{place}: is a library for windows on x86_64, this is {own}"),
-        (OWN.data[:18] + other + OWN.data[20:], None, f"{place}: is a library for linux on {foreign}, this is {own}"),
-        (OWN.data, "win32", f"holds no library for this system ({place}); found win32"),
-        (None, None, f"holds no library for this system ({place}); found none"),
+    expected = {}
+    for k, (library, folder, line) in enumerate(
+        (
+            (OWN.data[: len(OWN.data) // 2], None, f"{place}: is cut short: {len(OWN.data) // 2} of "),
+            (OWN.data[:40], None, f"{place}: is cut short"),
+            (b"", None, f"{place}: is no shared library"),
+            (b"hello", None, f"{place}: is no shared library"),
+            (windows(), None, f"{place}: is a library for windows on x86_64, this is {own}"),
+            (
+                OWN.data[:18] + other + OWN.data[20:],
+                None,
+                f"{place}: is a library for linux on {foreign}, this is {own}",
+            ),
+            (OWN.data, "win32", f"holds no library for this system ({place}); found win32"),
+            (None, None, f"holds no library for this system ({place}); found none"),
+        )
     ):
-        repacked(fmu, tmp_path / "bad.fmu", library, folder)
-        done = command("run", "bad.fmu", "--stop-time", "0.01")
-        assert (done.returncode, done.stdout) == (2, ""), line
-        assert done.stderr.startswith(f"error: bad.fmu: {line}") and done.stderr.count("\n") == 1, done.stderr
-    repacked(fmu, tmp_path / "bad.fmu", OWN.data)
-    assert command("run", "bad.fmu", "--stop-time", "0.01").returncode == 0
+        expected[repacked(fmu, tmp_path / f"bad{k}.fmu", library, folder).name] = line
+    good = repacked(fmu, tmp_path / "same.fmu", OWN.data).name
+    done = subprocess.run([sys.executable, "-c", RUNS, *expected, good], cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
+    *refused, taken = map(json.loads, done.stdout.splitlines())
+    assert [name for name, *_ in refused] == list(expected)
+    for name, status, out, error in refused:
+        assert (status, out) == (2, ""), name
+        assert error.startswith(f"error: {name}: {expected[name]}") and error.count("\n") == 1, error
+    assert taken[:2] == [good, 0]
 
 
 def test_a_library_without_the_functions_of_fmi_is_refused(weld, command, tmp_path):
