@@ -1,7 +1,7 @@
 # Toolchain file: cross compiling with the compiler of the PyPI wheel `ziglang`.
 # -DTIEFMU_ZIG=PATH/zig -DTIEFMU_TARGET=x86_64-linux-gnu.2.17 (zig's name of the system)
 list(APPEND CMAKE_TRY_COMPILE_PLATFORM_VARIABLES TIEFMU_ZIG TIEFMU_TARGET)
-if(NOT TIEFMU_TARGET MATCHES "^([^-]+)-([^-]+)(-.*)?$")
+if(NOT TIEFMU_TARGET MATCHES "^([^-]+)-([^-.]+)([-.].*)?$")
   message(FATAL_ERROR "TIEFMU_TARGET: expected e.g. x86_64-linux-gnu.2.17, found '${TIEFMU_TARGET}'")
 endif()
 set(CMAKE_SYSTEM_PROCESSOR ${CMAKE_MATCH_1})
