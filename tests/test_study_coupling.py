@@ -3,7 +3,9 @@
 import argparse
 import csv
 import math
+from dataclasses import asdict
 from pathlib import Path
+from typing import get_type_hints
 
 import numpy as np
 import pytest
@@ -26,15 +28,14 @@ def study(folder: Path, *arguments) -> list[dict]:
     options = parser.parse_args(["coupling", *map(str, arguments), "--out", str(folder)])
     assert options.command(options) == 0
     [file] = folder.glob("coupling_*.csv")
+    kinds = get_type_hints(coupling_runs.Row)
     with open(file, newline="") as text:
-        rows = list(csv.DictReader(text))
-    return [
-        {
-            key: value if key in ("scene", "host", "reaction", "extrapolation", "status") else float(value)
-            for key, value in row.items()
-        }
-        for row in rows
-    ]
+        return [{key: kinds[key](value) for key, value in row.items()} for row in csv.DictReader(text)]
+
+
+def rows_of(name: str, decades: float) -> list[dict]:
+    """The same, with neither files nor charts."""
+    return [asdict(row) for row in coupling_runs.Study(SCENES / name).rows(coupling.ladder(decades))]
 
 
 def of(rows, reaction, extrapolation, status=None):
@@ -46,13 +47,13 @@ def of(rows, reaction, extrapolation, status=None):
 
 
 @pytest.fixture(scope="module")
-def spotweld(tmp_path_factory):
-    return study(tmp_path_factory.mktemp("study"), SCENES / "spotweld.toml", "--decades", 2.5)
+def spotweld():
+    return rows_of("spotweld.toml", 2.5)
 
 
 @pytest.fixture(scope="module")
-def heavy(tmp_path_factory):
-    return study(tmp_path_factory.mktemp("study"), SCENES / "heavy_slave.toml", "--decades", 3)
+def heavy():
+    return rows_of("heavy_slave.toml", 3)
 
 
 @pytest.mark.parametrize("extrapolation", ORDERS)
@@ -100,8 +101,8 @@ def test_heavy_slave(heavy):
 
 
 def test_study_repeats_and_writes_everything(spotweld, tmp_path):
-    """Two runs differ only in the time column, here at the steps of the shorter one; a page, an SVG and a PNG stand
-    beside the CSV."""
+    """The CSV holds the rows of another run, here at the steps of the shorter one, but for the time column; a page, an
+    SVG and a PNG stand beside it."""
     again = study(tmp_path, SCENES / "spotweld.toml", "--decades", 1)
     first = [row for row in spotweld if row["steps"] in coupling.ladder(1)]
     for a, b in zip(first, again, strict=True):

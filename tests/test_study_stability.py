@@ -193,10 +193,11 @@ def test_reach():
 
 
 def test_study_writes_everything_and_repeats(tmp_path, capsys, monkeypatch):
-    """On every sixth limit, which is quicker; the limits themselves are tested above."""
+    """On every sixth limit and fourth mode, which is quicker; limits and modes themselves are tested above."""
     some = LIMITS[::6] + LIMITS[-1:]
     monkeypatch.setattr(stability_cases, "limits", lambda: some)
     monkeypatch.setattr(stability_cases, "VALUES", [stability_cases.split_values, stability_cases.clamp_values])
+    monkeypatch.setattr(stability_map, "MODES", stability_map.MODES[::4])
     monkeypatch.setattr(stability_map, "REACH", [10.0])
     written = []
     for name in ("a", "b"):
