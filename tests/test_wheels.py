@@ -82,6 +82,12 @@ def pythons(wheel: Path) -> list[str]:
 SAME = ["modelDescription.xml", "resources/scene.bin", "resources/report.json", "extra/tiefmu/reference_out.csv"]
 
 
+def held(path: Path) -> dict[str, bytes]:
+    """Large scenes have no reference results."""
+    with zipfile.ZipFile(path) as archive:
+        return {name: archive.read(name) for name in SAME if name in archive.namelist()}
+
+
 def path_of(scene: str) -> Path:
     return next(path for path in (ROOT / "scenes").glob(f"{scene}.*") if path.suffix in (".toml", ".rad"))
 
@@ -90,9 +96,9 @@ def path_of(scene: str) -> Path:
 def test_demo_in_a_fresh_environment(wheel, tmp_path):
     """Without a compiler in reach, and away from the checkout. The FMUs are those that the checkout builds, but for the
     libraries of further systems."""
-    found = pythons(wheel)
-    assert found, f"no Python for {wheel.name}"
-    for k, python in enumerate(found):
+    able = pythons(wheel)
+    assert able, f"no Python for {wheel.name}"
+    for k, python in enumerate(able):
         room = tmp_path / str(k)
         subprocess.run([python, "-m", "venv", room], check=True)
         environment = {"PATH": str(room / "bin"), "HOME": str(tmp_path), "LANG": "C.UTF-8"}
@@ -109,14 +115,11 @@ def test_demo_in_a_fresh_environment(wheel, tmp_path):
         assert [line.split()[0] for line in said.splitlines()[1:-1]] == SCENES
         for name in SCENES:
             here_built = tiefmu.build(tiefmu.load(path_of(name)), tmp_path / "here.fmu")
-            for file in SAME:
-                assert zipfile.ZipFile(room / "out" / f"{name}.fmu").read(file) == zipfile.ZipFile(here_built).read(
-                    file
-                )
+            assert held(room / "out" / f"{name}.fmu") == held(here_built)
         every = ",".join(platform.folder for platform in PLATFORMS)
         scene = next((room / "lib").glob("python3*/site-packages/tiefmu/scenes/spotweld.toml"))
         run(room / "bin" / "tiefmu", "build", scene, "-o", "all.fmu", "--platforms", every)
         for file, folders in (("out/spotweld.fmu", {"linux64", "win64"}), ("all.fmu", set(BY_FOLDER))):
             with zipfile.ZipFile(room / file) as archive:
-                held = {name.split("/")[1] for name in archive.namelist() if name.startswith("binaries/")}
-            assert held == folders
+                found = {name.split("/")[1] for name in archive.namelist() if name.startswith("binaries/")}
+            assert found == folders
