@@ -64,13 +64,16 @@ def lumping(row: dict | None) -> dict | None:
 
 
 def lumping_line(row: dict) -> str:
-    price = "two to five times" if row["connected"] else "one to four times"
-    ratio = (
-        "motions without any true energy" if row["ratio"] is None else f"up to {row['ratio']:.3g} times the true one"
-    )
+    """Of a surface the ratio is a bound: that of its worst segment alone."""
+    if row["ratio"] is None:
+        return (
+            f"lumped inertia: motions of the free masters have no true energy (segment {row['segment']}); "
+            '[model] inertia = "consistent" needs masters with mass of their own'
+        )
+    reach, price = ("at most", "two to five times") if row["connected"] else ("up to", "one to five times")
     return (
-        f"lumped inertia: kinetic energy of the free masters {ratio} (segment {row['segment']}); "
-        f'[model] inertia = "consistent" is exact, for {price} the time of a step'
+        f"lumped inertia: kinetic energy of the free masters is {reach} {row['ratio']:.3g} times the true one "
+        f'(segment {row["segment"]}); [model] inertia = "consistent" is exact, for {price} the time of a step'
     )
 
 

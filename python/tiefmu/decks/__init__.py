@@ -152,9 +152,9 @@ def compiled(found: Imported, expose: Sequence[str] = ()) -> Scene:
             scene = Scene(found.deck.file, path.stem, made, Path(folder))
         except SceneError as error:
             raise SceneError(escaped(f"{found.deck.file}: {error}")) from None
-    prefix = f"{found.deck.file}: "  # which whoever shows a scene's remarks adds
-    scene.notes += [line.removeprefix(prefix) for line in write.remarks(found.deck)]
-    scene.warnings += [line.removeprefix(prefix) for line in found.deck.warnings]
+    for remarks, lines in ((scene.notes, write.remarks(found.deck)), (scene.warnings, found.deck.warnings)):
+        # The file is named by whoever shows a scene's remarks, and its folder is no matter of the FMU.
+        remarks += [line.removeprefix(f"{path}: ").replace(str(path), path.name) for line in lines]
     return scene
 
 
