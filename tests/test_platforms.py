@@ -40,6 +40,10 @@ def test_a_library_is_cut_short_wherever_it_is_cut():
     for length in [*range(4, 64), *np.linspace(64, len(OWN.data) - 1, 50).astype(int).tolist()]:
         with pytest.raises(LibraryError, match="cut short"):
             library_of(OWN.data[:length])
+    beyond = bytearray(OWN.data)
+    beyond[32:40] = b"\xff" * 8  # where the program headers are
+    with pytest.raises(LibraryError, match="cut short"):
+        library_of(bytes(beyond))
     for data in (b"", b"\x7fE", b"#!/bin/sh\n", b"PK\3\4" * 40):
         with pytest.raises(LibraryError, match="is no shared library"):
             library_of(data)

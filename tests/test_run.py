@@ -2,6 +2,7 @@
 
 import csv
 import ctypes
+import re
 
 import fmpy
 import h5py
@@ -26,9 +27,8 @@ CSV = {
 }
 
 
-@pytest.fixture(scope="module")
-def fmu(tmp_path_factory):
-    scene = {
+def scene_of(names: str) -> dict:
+    return {
         "mesh": {
             "nodes": [[1, 0, 0, 0], [2, 0.1, 0, 0], [3, 0.1, 0.1, 0], [4, 0, 0.1, 0], [9, 0.03, 0.06, 0.04]],
             "segments": [[1, 1, 2, 3, 4]],
@@ -36,9 +36,13 @@ def fmu(tmp_path_factory):
         "node": [{"nodes": "all", "rotations": True, "mass": 1.0, "inertia": 1e-3}, {"nodes": [4], "motion": "free"}],
         "tie": [{"segments": "all", "slaves": [9]}],
         "spring": [{"ground": [4], "kind": "bushing", "stiffness": 1e3, "rotational_stiffness": 10.0}],
-        "interface": {"expose": ["energy", "drift"]},
+        "interface": {"expose": ["energy", "drift"], "names": names},
     }
-    return tiefmu.build(tiefmu.load(scene), tmp_path_factory.mktemp("run") / "tie.fmu")
+
+
+@pytest.fixture(scope="module")
+def fmu(tmp_path_factory):
+    return tiefmu.build(tiefmu.load(scene_of("structured")), tmp_path_factory.mktemp("run") / "tie.fmu")
 
 
 def of_fmpy(fmu, signals, stop, step):
@@ -201,6 +205,16 @@ def test_the_five_quantities(fmu, tmp_path):
     assert lines[2] == f"  drift             {np.abs(result['drift']).max():.2g} m"
     count = int(np.ceil(0.05 / (0.9 * of_fmu(fmu)["integrator_limit"])))
     assert lines[3] == f"  substeps          {count} a step, by the limit at the start"
+
+
+def test_the_five_quantities_by_flat_names(fmu, tmp_path):
+    flat = tiefmu.build(tiefmu.load(scene_of("flat")), tmp_path / "flat.fmu")
+    lines = []
+    for path, text in ((fmu, CSV["jumps"]), (flat, CSV["jumps"].replace("slave[1].f[3]", "slave_1_f_3"))):
+        (tmp_path / "in.csv").write_text(text)
+        lines.append(run(path, None, 0.05, tmp_path / "in.csv")[1][:4])
+    assert re.sub(r"master\[(\d)\]\.f", r"master_\1_f", "\n".join(lines[0])) == "\n".join(lines[1])
+    assert "master_" in lines[1][0] and "not shown" not in "".join(lines[1])
 
 
 def test_a_missing_package_is_named_with_its_extra(fmu, tmp_path, monkeypatch, capsys):

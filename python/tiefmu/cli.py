@@ -85,6 +85,7 @@ def parser() -> argparse.ArgumentParser:
     build.add_argument(
         "--platforms",
         metavar="NAMES",
+        action="extend",
         type=lambda text: [name.strip() for name in text.split(",")],
         help=f"systems that the FMU is for, of {', '.join(BY_FOLDER)} (default: this one, linux64 and win64, "
         "in a checkout as far as `make binaries` has built them)",
@@ -170,9 +171,9 @@ def run_build(options: argparse.Namespace) -> None:
     fmu = build(scene, options.output or Path(f"{scene.name}.fmu"), criteria, options.platforms, options.fmi)
     found = report(scene, arrays=options.fmi == 3)
     show_warnings(options.scene, found)
-    if not options.platforms and stale():
+    if left := [name for name in stale() if name in (options.platforms or stale())]:
         print(
-            f"warning: libraries for {', '.join(stale())} are left out: they were made from other sources; run "
+            f"warning: libraries for {', '.join(left)} are left out: they were made from other sources; run "
             "`make binaries` again",
             file=sys.stderr,
         )

@@ -9,7 +9,12 @@ from .fmu_instance import Fmu
 from .report import of_folder
 from .results import Result
 
-REACTION = re.compile(r"((?:master|port)\[.*\]\.f)\[1\]")
+REACTION = re.compile(r"((?:master|port)(?:\[.*\]\.|_.*_)f)(\[1\]|_1)")
+
+
+def written(name: str, known) -> str:
+    """A variable's name as the FMU has it, structured or flat."""
+    return name if name in known else name.replace(".", "_")
 
 
 class Reactions:
@@ -17,9 +22,13 @@ class Reactions:
 
     def __init__(self, names: list[str]):
         """names: of the outputs."""
-        self.names = [match[1] for match in map(REACTION.fullmatch, names) if match]
+        found = [match for match in map(REACTION.fullmatch, names) if match]
+        self.names = [match[1] for match in found]
+        self.first = [match[0] for match in found]
         column = {name: 1 + k for k, name in enumerate(names)}
-        self.columns = np.array([[column[f"{name}[{k}]"] for k in (1, 2, 3)] for name in self.names], dtype=int)
+        self.columns = np.array(
+            [[column[match[1] + match[2].replace("1", k)] for k in "123"] for match in found], dtype=int
+        )
         self.square, self.where, self.time = -1.0, "", 0.0
 
     def write(self, block: np.ndarray) -> None:
@@ -34,7 +43,8 @@ class Reactions:
 
 def energy_scale(result: Result) -> float:
     """The largest energy of the run, J."""
-    return max(result.largest(f"energy.{kind}") for kind in ("kinetic", "strain", "external"))
+    names = [written(f"energy.{kind}", result.columns) for kind in ("kinetic", "strain", "external")]
+    return max(map(result.largest, names))
 
 
 def substeps(fmu: Fmu, step: float) -> int | None:
@@ -45,7 +55,7 @@ def substeps(fmu: Fmu, step: float) -> int | None:
     longest = found["integrator_limit"]
 
     def parameter(name: str, default: float) -> float:
-        variable = fmu.variables.get(f"integrator.{name}")
+        variable = fmu.variables.get(written(f"integrator.{name}", fmu.variables))
         return default if variable is None else float(variable.start)
 
     longest *= parameter("safety", 1.0)
@@ -56,11 +66,10 @@ def substeps(fmu: Fmu, step: float) -> int | None:
 
 def lines(fmu: Fmu, result: Result, reactions: Reactions, step: float) -> list[str]:
     """One line each. step: of communication, s."""
-    variable = fmu.variables.get(f"{reactions.where}[1]")
+    variable = fmu.variables.get(reactions.first[reactions.names.index(reactions.where)]) if reactions.where else None
     node = re.search(r"\(node \d+\)", (variable and variable.description) or "")
-    balance = (
-        part(result.largest("energy.residual"), energy_scale(result)) if "energy.residual" in result.columns else ""
-    )
+    residual = written("energy.residual", result.columns)
+    balance = part(result.largest(residual), energy_scale(result)) if residual in result.columns else ""
     words = {
         "largest reaction": f"{math.sqrt(reactions.square):.6g} N at {reactions.where}{' ' + node[0] if node else ''}, "
         f"t = {reactions.time:.6g} s"

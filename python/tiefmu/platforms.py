@@ -62,7 +62,7 @@ def library_of(data: bytes) -> tuple[str, set[str]]:
         if data.startswith(magic):
             try:
                 system, machines, size = read(data)
-            except struct.error:
+            except (struct.error, OverflowError):
                 raise LibraryError("is cut short") from None
             if size > len(data):
                 raise LibraryError(f"is cut short: {len(data)} of {size} bytes")
