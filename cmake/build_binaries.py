@@ -71,7 +71,8 @@ def processor_time() -> float:
 
 
 def commands(target: str, folder: Path, compiler: Path) -> list[list]:
-    setting_up = ["cmake", "-S", CHECKOUT, "-B", folder, "-G", "Ninja"]
+    # Fresh: flags that an older toolchain file gave would stay.
+    setting_up = ["cmake", "--fresh", "-S", CHECKOUT, "-B", folder, "-G", "Ninja"]
     setting_up += [f"-DCMAKE_TOOLCHAIN_FILE={CHECKOUT / 'cmake' / 'zig.cmake'}", f"-DTIEFMU_ZIG={compiler}"]
     setting_up += [f"-DTIEFMU_TARGET={target}", "-DTIEFMU_PYTHON=OFF", "-DCMAKE_BUILD_TYPE=Release"]
     setting_up += [f"-DPython_EXECUTABLE={sys.executable}"]

@@ -306,6 +306,7 @@ def test_the_written_scene_is_the_deck(tmp_path, monkeypatch):
         rows = list(csv.DictReader(file))
     assert [row["id"] for row in rows] == ["1", "2", "3", "4", "11", "12"]
     assert any("NEWTHING" in line for line in direct.warnings) and any("Spotflag" in line for line in direct.notes)
+    assert str(tmp_path) not in str([direct.warnings, direct.notes])  # which the FMU holds
     assert sorted(p.name for p in tmp_path.iterdir()) == [
         *("deck_0000.rad", "weld.mesh.npz", "weld.nodes.csv", "weld.toml")
     ]

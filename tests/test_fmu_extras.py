@@ -231,6 +231,13 @@ def test_a_scene_that_takes_many_substeps_has_no_reference_results(weld, monkeyp
     scene = tiefmu.load(weld)
     assert reference_results.reference(scene, 1e-3)
     assert reference_results.reference(scene, 10.0) == {}
+    simulation, one = scene.simulation(), scene.simulation()
+    with monkeypatch.context() as patch:
+        patch.setattr(scene, "simulation", lambda: simulation)
+        assert reference_results.reference(scene, 100.0) == {}
+    one.initialise(0.0)
+    one.step(100.0)
+    assert simulation.evaluations < 1.1 * one.evaluations  # it has given up in the first step
     monkeypatch.setattr(reference_results, "MOST_EVALUATIONS", np.inf)
     assert reference_results.reference(scene, 10.0)
 

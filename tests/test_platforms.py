@@ -167,6 +167,8 @@ def test_what_was_built_goes_into_every_fmu(weld, built, scene_file, capsys):
     }
     assert main(["build", name, "--platforms", "win64"]) == 0
     assert [f for f in zipfile.ZipFile("weld.fmu").namelist() if f.startswith("bin")] == ["binaries/win64/weld.dll"]
+    assert main(["build", name, "--platforms", "win64", "--platforms", here().folder]) == 0
+    assert capsys.readouterr().out.splitlines()[-1].endswith(f", for win64, {OWN.text}")
 
 
 def test_a_library_made_from_other_sources_is_left_out(weld, built, scene_file, capsys):
@@ -182,6 +184,11 @@ def test_a_library_made_from_other_sources_is_left_out(weld, built, scene_file, 
     assert capsys.readouterr().err == (
         f"error: platform 'win64': {binaries.BUILT / 'win64'} was made from other sources; run `make binaries` again\n"
     )
+    built(here().folder, made_from="0" * 64)  # the local one takes its place
+    assert main(["build", name, "--platforms", here().folder]) == 0
+    said = capsys.readouterr()
+    assert said.err.splitlines()[-1].startswith(f"warning: libraries for {here().folder} are left out: ")
+    assert said.out.splitlines()[-1].endswith(f", for {OWN.text}")
 
 
 def test_a_wheel_brings_the_libraries_of_all_systems(weld, built, tmp_path, monkeypatch, scene_file, capsys):

@@ -171,7 +171,7 @@ def run_build(options: argparse.Namespace) -> None:
     fmu = build(scene, options.output or Path(f"{scene.name}.fmu"), criteria, options.platforms, options.fmi)
     found = report(scene, arrays=options.fmi == 3)
     show_warnings(options.scene, found)
-    if left := [name for name in stale() if name in (options.platforms or stale())]:
+    if left := [name for name in stale() if not options.platforms or name in options.platforms]:
         print(
             f"warning: libraries for {', '.join(left)} are left out: they were made from other sources; run "
             "`make binaries` again",

@@ -23,8 +23,8 @@ class Reactions:
     def __init__(self, names: list[str]):
         """names: of the outputs."""
         found = [match for match in map(REACTION.fullmatch, names) if match]
-        self.names = [match[1] for match in found]
-        self.first = [match[0] for match in found]
+        self.first = {match[1]: match[0] for match in found}  # name of its first component
+        self.names = list(self.first)
         column = {name: 1 + k for k, name in enumerate(names)}
         self.columns = np.array(
             [[column[match[1] + match[2].replace("1", k)] for k in "123"] for match in found], dtype=int
@@ -66,7 +66,7 @@ def substeps(fmu: Fmu, step: float) -> int | None:
 
 def lines(fmu: Fmu, result: Result, reactions: Reactions, step: float) -> list[str]:
     """One line each. step: of communication, s."""
-    variable = fmu.variables.get(reactions.first[reactions.names.index(reactions.where)]) if reactions.where else None
+    variable = fmu.variables.get(reactions.first.get(reactions.where, ""))
     node = re.search(r"\(node \d+\)", (variable and variable.description) or "")
     residual = written("energy.residual", result.columns)
     balance = part(result.largest(residual), energy_scale(result)) if residual in result.columns else ""
